@@ -27,11 +27,11 @@ pub fn run() -> Result<Vec<f64>> {
     let log = simulated_log(&machine, plan, &touches, Some(&control));
 
     // a study of the log
+    let effects = default_effects(&machine, &[plan], false);
     files.write(Path::new("full.plan.json"), Some(plan.to_json().as_bytes()))?;
     files.write(Path::new("full.log"), Some(log.as_bytes()))?;
     let (plan, log) = ("full.plan.json".into(), "full.log".into());
     let run = NewRun { plan, log, controller: "linuxcnc".to_owned(), compensation: None };
-    let effects = default_effects(&machine, false);
     let new = NewStudy { folder: Path::new(""), machines: None, effects: &effects, effects_files: &[], runs: &[run] };
     let study = Path::new("study.toml");
     files.write(study, Some(new.text(&machine, &files)?.as_bytes()))?;

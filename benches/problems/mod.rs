@@ -8,7 +8,7 @@ use axiscal::fit::normal::Touches;
 use axiscal::fit::solve::{self, Problem as _, Solution};
 use axiscal::fit::{self, Settings};
 use axiscal::log::{RawTouch, Status, Touch};
-use axiscal::machine::{self, Machine};
+use axiscal::machine::{self, Form, Machine};
 use axiscal::model::catalogue::Catalogue;
 use axiscal::model::data::{Data, Run, assemble};
 use axiscal::model::predict::Model;
@@ -142,7 +142,9 @@ fn block(i: usize, rng: &mut ChaCha8Rng) -> PlanBlock {
         carrier: if i.is_multiple_of(2) { "C" } else { "table" }.into(),
         mounting: None,
         centre: [spread(120.0), spread(120.0), -202.684 + spread(30.0)],
+        form: Form::Box,
         size: [10.0; 3],
+        diameter: None,
     }
 }
 

@@ -52,7 +52,6 @@ pub struct Args {
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let machine = args.machine.load(io)?;
     let catalogue = load_effects(&args.effects_file, io)?;
-    let ids = if args.effects.is_empty() { default_effects(&machine, args.known_blocks) } else { args.effects.clone() };
     let noise_um = args.noise_um.unwrap_or(machine.probe.repeatability_um);
     let unusable = |word: &str, um: f64, least: &str| {
         Err(Failure::new("assess::noise", format!("{word} is {um}, expected micrometres, {least}"))
@@ -65,6 +64,18 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if let Some(um) = args.visit_um.filter(|um| !usable(*um, 0.0)) {
         return unusable("--visit-um", um, "0 or more");
     }
+    let mut asked = Vec::new();
+    for words in &args.plan {
+        let names: Vec<String> = words.split(',').map(|w| w.trim().to_owned()).filter(|w| !w.is_empty()).collect();
+        let plans = names.iter().map(|w| plan_of(w, &machine, io)).collect::<Result<Vec<Plan>>>()?;
+        asked.push((names, plans));
+    }
+    let ids = if args.effects.is_empty() {
+        let plans: Vec<&Plan> = asked.iter().flat_map(|(_, plans)| plans).collect();
+        default_effects(&machine, &plans, args.known_blocks)
+    } else {
+        args.effects.clone()
+    };
     let task = Task {
         machine: &machine,
         catalogue: &catalogue,
@@ -74,13 +85,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         temperature: !args.no_temperature,
     };
     let mut answers = Vec::new();
-    for words in &args.plan {
-        let names: Vec<String> = words.split(',').map(|w| w.trim().to_owned()).filter(|w| !w.is_empty()).collect();
-        let runs =
-            names.iter().map(|w| plan_of(w, &machine, io).map(Planned::new)).collect::<Result<Vec<Planned>>>()?;
+    for (names, plans) in asked {
         answers.push(assess(&Request {
             task: task.clone(),
-            runs,
+            runs: plans.into_iter().map(Planned::new).collect(),
             names,
             probe: Noise { sigma_mm: mm_from_um(noise_um), tau_mm: 0.0 },
             acting_tau_mm: args.visit_um.map(mm_from_um),

@@ -4,6 +4,7 @@ use super::common::MachineArgs;
 use super::{Answer, Io};
 use crate::diag::{Failure, Result};
 use crate::files;
+use crate::workflow::load_plan;
 use crate::workflow::new::{NewRun, NewStudy, default_effects};
 use serde_json::json;
 use std::path::{Path, PathBuf};
@@ -57,8 +58,12 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             if args.compensation.is_empty() { None } else { Some(pick(&args.compensation, i, "--compensation")?) };
         runs.push(NewRun { plan: plan.clone(), log: log.clone(), controller, compensation: active });
     }
-    let effects =
-        if args.effects.is_empty() { default_effects(&machine, args.known_blocks) } else { args.effects.clone() };
+    let effects = if args.effects.is_empty() {
+        let plans = args.plan.iter().map(|p| load_plan(p, &machine, io)).collect::<Result<Vec<_>>>()?;
+        default_effects(&machine, &plans.iter().collect::<Vec<_>>(), args.known_blocks)
+    } else {
+        args.effects.clone()
+    };
     let new = NewStudy {
         folder: args.out.parent().unwrap_or(Path::new("")),
         machines: args.machine.machines.as_deref(),

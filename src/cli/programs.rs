@@ -131,7 +131,8 @@ fn show(spec: &ProgramSpec, machine: &str, layout: &Layout, io: &Io) {
     for s in &layout.setups {
         let touches = s.targets.len() * s.spec.repeats as usize;
         total += touches;
-        let faces: Vec<String> = s.spec.faces.iter().map(|f| format!("{} {}", f.face.value, f.grid.value)).collect();
+        let faces = s.spec.faces.iter().map(|f| format!("{} {}", f.face.value, f.grid.value));
+        let faces: Vec<String> = faces.chain(s.spec.rings.iter().map(|r| r.name.value.clone())).collect();
         t.add_row(vec![
             Cell::new(&s.spec.stage),
             Cell::new(pose_says(&s.pose)),

@@ -215,8 +215,10 @@ pub fn as_plan(machine: &Machine, mounting: &Mounting, bundles: &[Bundle], time_
                 name: b.name.clone(),
                 carrier: b.carrier.to_string(),
                 mounting: None,
+                form: b.form,
                 centre: b.centre.into(),
                 size: b.size.into(),
+                diameter: b.diameter,
             })
             .collect(),
         touches,

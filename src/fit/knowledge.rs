@@ -39,6 +39,9 @@ pub fn effects_of<'c>(ids: &[String], catalogue: &'c Catalogue, machine: &Machin
     // two effects may not bring the same parameter: their columns would be equal and the names would clash
     for (i, a) in effects.iter().enumerate() {
         for b in &effects[..i] {
+            if a.is_of_other_bodies_than(b) {
+                continue;
+            }
             if let Some(p) = a.parameters.iter().find(|p| b.parameters.iter().any(|q| q.name == p.name)) {
                 findings.push(
                     Finding::error(

@@ -1,5 +1,6 @@
 //! `machines.toml` as a person wrote it: every field as it stands, with its place in the file. Nothing is checked here.
 
+use super::form::Form;
 use crate::axes::{AxisMap, AxisName};
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -318,14 +319,17 @@ pub struct Mounting {
     pub block: Vec<Block>,
 }
 
-/// What a block stands on: a box under it.
+/// What a block stands on: a box or a round stem under it.
 #[derive(Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Riser {
     /// From the block's lower face down, mm.
     pub height: f64,
     /// Edges along X and Y, mm; along the two other axes where it does not go along Z.
+    #[serde(default)]
     pub size: [f64; 2],
+    /// Instead of the edges: of a round stem, mm.
+    pub diameter: Option<f64>,
     /// Where it goes from the block, e.g. `-Y`; left out: -Z, or to where the carrier's solids are.
     pub toward: Option<Toward>,
 }
@@ -335,6 +339,9 @@ impl std::fmt::Debug for Riser {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let mut out = f.debug_struct("Riser");
         out.field("height", &self.height).field("size", &self.size);
+        if let Some(diameter) = self.diameter {
+            out.field("diameter", &diameter);
+        }
         if let Some(toward) = self.toward.filter(|t| *t != Toward::MinusZ) {
             out.field("toward", &toward);
         }
@@ -396,7 +403,7 @@ impl Toward {
     }
 }
 
-/// A block, mm in R at zero.
+/// A body that is touched, mm in R at zero.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Block {
@@ -406,9 +413,18 @@ pub struct Block {
     /// Its centre.
     #[schemars(with = "[f64; 3]")]
     pub centre: Spanned<[f64; 3]>,
-    /// Its full edges.
-    #[schemars(with = "[f64; 3]")]
-    pub size: Spanned<[f64; 3]>,
+    /// What it is; without it a box.
+    #[serde(default)]
+    pub form: Form,
+    /// Full edges of a box, of the body round a bore, of a plane.
+    #[schemars(with = "Option<[f64; 3]>")]
+    pub size: Option<Spanned<[f64; 3]>>,
+    /// Of a sphere, a cylinder or a bore.
+    #[schemars(with = "Option<f64>")]
+    pub diameter: Option<Spanned<f64>>,
+    /// Of a cylinder.
+    #[schemars(with = "Option<f64>")]
+    pub height: Option<Spanned<f64>>,
     /// Where it differs from the mounting's.
     pub riser: Option<Riser>,
     /// Where it differs from the mounting's: a fixed block beside those that turn.

@@ -3,7 +3,7 @@
 use super::as_written as w;
 use super::check::{Check, LARGEST, LARGEST_SCATTER_UM};
 use super::risers;
-use super::{Block, Carrier, Mounting, SAME_STYLUS_MM, Shape, Solid, Stylus, Tool};
+use super::{Block, Carrier, Form, Mounting, SAME_STYLUS_MM, Shape, Solid, Stylus, Tool};
 use crate::diag::Finding;
 use crate::units::Plain;
 use nalgebra::Vector3;
@@ -14,6 +14,13 @@ pub(super) struct Carriers<'a> {
     pub(super) of: &'a dyn Fn(&str) -> Option<Carrier>,
     /// An axis was refused, so the chain may lack axes that the file has: a missing carrier is not worth saying.
     pub(super) cut: bool,
+}
+
+/// What a body measures, mm.
+struct Dimensions {
+    /// The box that holds it.
+    size: Vector3<f64>,
+    diameter: Option<f64>,
 }
 
 impl Check<'_> {
@@ -241,10 +248,65 @@ impl Check<'_> {
         found
     }
 
+    /// The edges of the box that holds a body, and its diameter.
+    fn dimensions(&mut self, b: &w::Block) -> Option<Dimensions> {
+        let block = b.name.get_ref();
+        let is_length = |mm: f64| mm > 0.0 && mm <= LARGEST;
+        let size = b.size.as_ref().map(|s| *s.get_ref());
+        if let (Some(written), Some(size)) = (&b.size, size.filter(|s| !s.iter().all(|mm| is_length(*mm)))) {
+            self.error(
+                &written.span(),
+                "machine::block_size",
+                format!("size of block {block:?} is {size:?}"),
+                format!("write three edges in mm, more than 0 and up to {LARGEST}"),
+            );
+            return None;
+        }
+        for (field, length) in [("diameter", &b.diameter), ("height", &b.height)] {
+            if let Some(written) = length.as_ref().filter(|mm| !is_length(*mm.get_ref())) {
+                self.error(
+                    &written.span(),
+                    "machine::block_size",
+                    format!("{field} of block {block:?} is {} mm", Plain(*written.get_ref())),
+                    format!("write mm, more than 0 and up to {LARGEST}"),
+                );
+                return None;
+            }
+        }
+        let (diameter, height) = (b.diameter.as_ref().map(|d| *d.get_ref()), b.height.as_ref().map(|h| *h.get_ref()));
+        let edges = match (b.form, size, diameter, height) {
+            (Form::Box | Form::Plane, Some(size), None, None) => Some(size),
+            (Form::Sphere, None, Some(d), None) => Some([d; 3]),
+            (Form::Cylinder, None, Some(d), Some(h)) => Some([d, d, h]),
+            (Form::Bore, Some(size), Some(d), None) if d < size[0].min(size[1]) => Some(size),
+            _ => None,
+        };
+        if edges.is_none() {
+            let needs = match b.form {
+                Form::Box | Form::Plane => "size = [x, y, z]",
+                Form::Sphere => "diameter",
+                Form::Cylinder => "diameter and height",
+                Form::Bore => {
+                    "diameter (of the hole) and size = [x, y, z] (of the body round it, larger than the hole)"
+                }
+            };
+            self.error(
+                &b.name.span(),
+                "machine::block_form",
+                format!("block {block:?} is a {}, and its dimensions do not say so", b.form.as_str()),
+                format!("a {} has {needs}, in mm, and nothing else", b.form.as_str()),
+            );
+        }
+        edges.map(|size| Dimensions { size: size.into(), diameter })
+    }
+
     fn riser_is_good(&mut self, span: &Range<usize>, of: &str, r: &w::Riser) -> bool {
-        let is_good = r.height > 0.0 && r.height <= LARGEST && r.size.iter().all(|s| *s > 0.0 && *s <= LARGEST);
+        let is_length = |mm: f64| mm > 0.0 && mm <= LARGEST;
+        let wide =
+            r.diameter.map_or_else(|| r.size.iter().all(|s| is_length(*s)), |d| is_length(d) && r.size == [0.0; 2]);
+        let is_good = is_length(r.height) && wide;
         if !is_good {
-            let help = format!("write height and size in mm, more than 0 and up to {LARGEST}");
+            let help = format!("write height, and size or diameter, in mm, more than 0 and up to {LARGEST}");
             self.error(span, "machine::riser", format!("riser of {of} has no usable size"), help);
         }
         is_good
@@ -304,17 +366,7 @@ impl Check<'_> {
                 );
             }
             let centre = self.finite3(&b.centre.span(), &format!("centre of block {block:?}"), *b.centre.get_ref())?;
-            let size = *b.size.get_ref();
-            if !size.iter().all(|s| *s <= LARGEST && *s > 0.0) {
-                self.error(
-                    &b.size.span(),
-                    "machine::block_size",
-                    format!("size of block {block:?} is {size:?}"),
-                    format!("write three edges in mm, more than 0 and up to {LARGEST}"),
-                );
-                continue;
-            }
-            let size = Vector3::from(size);
+            let Some(Dimensions { size, diameter }) = self.dimensions(b) else { continue };
             // blocks may touch, not stand in each other
             let within = |o: &Block| ((o.size + size) / 2.0 - (o.centre - centre).abs()).min();
             if let Some(other) = blocks.iter().find(|o| within(o) > 1e-6) {
@@ -349,13 +401,16 @@ impl Check<'_> {
                 let placed = risers::place(&centre, &size, r, carrier, &bearing);
                 self.say_hanging(machine, b, &placed);
                 r.toward = Some(placed.toward);
+                // a stem goes into its sphere
+                let within = if b.form == Form::Sphere { size / 2.0 } else { Vector3::zeros() };
+                let whole = w::Riser { height: r.height + within.z, ..*r };
                 solids.push(Solid {
                     name: format!("riser of {block}"),
                     carrier,
-                    shape: risers::body(&centre, &size, r, placed.toward),
+                    shape: risers::body(&centre, &(size - within * 2.0), &whole, placed.toward),
                 });
             }
-            blocks.push(Block { name: block.clone(), centre, size, riser, carrier });
+            blocks.push(Block { name: block.clone(), form: b.form, centre, size, diameter, riser, carrier });
         }
         if blocks.is_empty() {
             self.error(

@@ -7,9 +7,11 @@
 pub mod as_written;
 mod check;
 mod check_parts;
+mod form;
 mod risers;
 
 pub use check::load;
+pub use form::Form;
 
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Result, source};
@@ -162,18 +164,34 @@ pub struct Solid {
     pub shape: Shape,
 }
 
-/// A block of an artefact, mm in R at zero.
-#[derive(Debug, Clone)]
+/// An artefact's body that is touched, mm in R at zero.
+#[derive(Clone)]
 pub struct Block {
     /// Short name.
     pub name: String,
+    pub form: Form,
     pub centre: Vector3<f64>,
-    /// Its full edges.
+    /// Full edges of the box that holds it.
     pub size: Vector3<f64>,
-    /// Height and edges of the box under it.
+    /// Of a sphere, a cylinder or a hole.
+    pub diameter: Option<f64>,
+    /// Height and edges of what is under it.
     pub riser: Option<as_written::Riser>,
     /// What bears it.
     pub carrier: Carrier,
+}
+
+// machines are recognised by a digest of their records' debug form: a box is written as it always was
+impl std::fmt::Debug for Block {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let mut out = f.debug_struct("Block");
+        out.field("name", &self.name).field("centre", &self.centre).field("size", &self.size);
+        out.field("riser", &self.riser).field("carrier", &self.carrier);
+        if !self.form.is_box() {
+            out.field("form", &self.form).field("diameter", &self.diameter);
+        }
+        out.finish()
+    }
 }
 
 /// An artefact as it is mounted.

@@ -54,11 +54,18 @@ pub(super) fn place(
     }
 }
 
-/// Centre and edges of a riser's box.
+/// The body of a riser.
 pub(super) fn body(centre: &Vector3<f64>, size: &Vector3<f64>, riser: &Riser, toward: Toward) -> Shape {
     let (axis, sign) = toward.axis_and_sign();
     let mut middle = *centre;
     middle[axis] += sign * (size[axis] / 2.0 + riser.height / 2.0);
+    if let Some(diameter) = riser.diameter {
+        let mut direction = Vector3::zeros();
+        direction[axis] = sign;
+        let foot = centre + direction * (size[axis] / 2.0);
+        let direction = nalgebra::Unit::new_unchecked(direction);
+        return Shape::Cylinder { foot, direction, radius: diameter / 2.0, height: riser.height };
+    }
     let [one, other] = riser.size;
     let edges = match axis {
         0 => Vector3::new(riser.height, one, other),
@@ -137,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_riser_goes_to_the_table_wherever_that_is() {
-        let riser = Riser { height: 15.0, size: [8.0, 6.0], toward: None };
+        let riser = Riser { height: 15.0, size: [8.0, 6.0], diameter: None, toward: None };
         let upright = disc(Vector3::y(), Vector3::new(0.0, -31.3, 0.0));
         let level = disc(Vector3::z(), Vector3::new(0.0, 0.0, -40.0));
         let found = placed(riser, &[&upright]);

@@ -1,5 +1,6 @@
 //! `effects.toml` as a person wrote it: every field as it stands, with its place in the file. Nothing is checked here.
 
+use super::surface::Body;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
@@ -79,6 +80,9 @@ pub struct EffectAsWritten {
     pub discrete: bool,
     /// `block`: a set of parameters for each block. `run`: one for each run after the first.
     pub per: Option<Per>,
+    /// With `per = "block"`: the bodies that have it; all where it is missing.
+    #[serde(default)]
+    pub of: Vec<Body>,
     /// Solved for, but no result.
     #[serde(default)]
     pub nuisance: bool,

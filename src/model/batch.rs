@@ -171,7 +171,7 @@ impl Model {
             active: i as u32,
             coefficient: a.constant().map_or(f64::NAN, |value| a.factor * value),
         };
-        let of = |s: usize| self.active.iter().enumerate().filter(move |(_, a)| a.set_up.is_none_or(|own| own == s));
+        let of = |s: usize| self.active.iter().enumerate().filter(move |(_, a)| a.is_seen_at(s));
         let entries = (0..self.set_ups().len()).map(|s| of(s).map(entry).collect()).collect();
         let n_rotary_workpiece = self.workpiece.iter().filter(|l| l.axis.name.is_rotary()).count();
         let roles = Roles {
@@ -444,7 +444,7 @@ impl At<'_> {
             met.push(point);
             point = at_slot(i).rigid.undo(&point);
         }
-        let gap = o.normal.dot(&(point - o.point)) - o.ball_radius;
+        let (gap, along_gap) = o.surface.gap(&point, o.ball_radius);
         if !derive {
             return gap;
         }
@@ -453,7 +453,7 @@ impl At<'_> {
         gradient.fill([0.0; 6]);
         let mut along = 0.0;
         let on_line = |axis: &Axis, g: &Vector3<f64>| g.dot(&axis.direction) * planned.dot(&axis.direction);
-        let mut g = o.normal;
+        let mut g = along_gap;
         // a place on the workpiece side is undone: q = E⁻¹·p, dq = −Rᵀ·dE·q
         let mut back = met.iter().rev();
         let undone = |p: Option<&Vector3<f64>>, i: usize, g: &mut Vector3<f64>, gradient: &mut [[f64; 6]]| {

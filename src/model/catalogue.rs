@@ -6,6 +6,7 @@ use super::check::Check;
 use super::for_each_axis::expand;
 use super::formula::Formula;
 pub use super::lever_arm::Arm;
+use super::surface::Body;
 use crate::axes::AxisName;
 use crate::diag::{Findings, Result, Source};
 use crate::keys::not_of_form;
@@ -107,6 +108,8 @@ pub struct Effect {
     pub arm: Option<Arm>,
     /// One set of parameters for each block.
     pub per_block: bool,
+    /// The bodies that have such a set; empty: all.
+    pub of: Vec<Body>,
     /// One set of parameters for each run after the first: how it differs from that one.
     pub per_run: bool,
     /// Solved for, but no result.
@@ -140,6 +143,13 @@ impl Effect {
     #[must_use]
     pub fn is_repeated(&self) -> bool {
         self.per_block || self.per_run
+    }
+
+    /// True when no body has both: their parameters carry the names of their bodies.
+    #[must_use]
+    pub fn is_of_other_bodies_than(&self, other: &Self) -> bool {
+        let named = |e: &Self| e.per_block && !e.of.is_empty();
+        named(self) && named(other) && !self.of.iter().any(|body| other.of.contains(body))
     }
 
     /// True when no machine can have both: rows of one id must differ so.

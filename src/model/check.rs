@@ -165,6 +165,7 @@ impl<'a> Check<'a> {
             about: w.about,
             arm,
             per_block: w.per == Some(Per::Block),
+            of: w.of.clone(),
             per_run: w.per == Some(Per::Run),
             nuisance: w.nuisance,
             paper: w.paper,

@@ -3,6 +3,7 @@
 use super::formula::{State, VARIABLES, slot};
 use super::predict::{Observation, SetUp};
 use super::spindle::{self, SpindleStretch};
+use super::surface::{self, Body, Surface};
 use super::temperatures::TemperatureGap;
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::log::{Status, Supposed, Touch, suppose};
@@ -195,14 +196,18 @@ pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[Spindle
                 (None, "") => planned.block.to_string(),
                 (None, mounting) => format!("{mounting}/{}", planned.block),
             };
+            let seen = data.set_ups.len();
             let set_up = data.set_ups.iter().position(|s| s.label == set_up_label).unwrap_or_else(|| {
                 let (centre, runs) = (block.centre.into(), Vec::new());
-                data.set_ups.push(SetUp { label: set_up_label, carrier, centre, runs });
+                data.set_ups.push(SetUp { label: set_up_label, carrier, body: Body::default(), centre, runs });
                 data.set_ups.len() - 1
             });
             if data.set_ups[set_up].runs.last() != Some(&index) {
                 data.set_ups[set_up].runs.push(index);
             }
+            let surface = Surface::of(block, planned);
+            let already = (set_up < seen).then(|| data.set_ups[set_up].body);
+            data.set_ups[set_up].body = Body::of(block.form, &surface, already);
             let point: Vector3<f64> = planned.point.into();
             let normal = Vector3::from(planned.normal).normalize();
             let length_mm = planned.tool_length_mm.unwrap_or(run.plan.tool_length_mm);
@@ -217,6 +222,7 @@ pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[Spindle
                 set_up,
                 point,
                 normal,
+                surface,
                 ball_radius,
                 ball_at_zero: machine.tool.ball_at_zero(length_mm),
                 position,
@@ -436,10 +442,11 @@ impl Circumstances<'_> {
         put(slot::NORMAL_IN_R, plain(in_r));
         put(slot::NORMAL_IN_PROBE, plain(into_probe * (into_tool * in_r)));
         put(slot::GRAVITY, plain(into_tool * -Vector3::z()));
+        put(slot::GRAVITY_AT_BLOCK, plain(c.machine.carrier_frame(c.carrier, c.at).rotation.inverse() * -Vector3::z()));
         put(slot::NORMAL_OF_BLOCK, normal);
         put(slot::POINT, c.planned.point.into());
         put(slot::OUTWARD, plain(outward(c.machine, c.carrier, &c.block.centre.into())));
-        state[slot::EDGE] = Vector3::from(c.block.size).dot(&normal.abs());
+        state[slot::EDGE] = surface::edge(c.block, &Surface::of(c.block, c.planned), &normal);
         state
     }
 }

@@ -10,11 +10,11 @@ use std::sync::Arc;
 /// The variables of a touch that a formula may use, in the order of [`State`]. A new one is also written in `fit::MOVING` (if it
 /// changes between two visits of one pose), `workbench/draft.rs`, `simulate/own/formula.rs` and, where patterns of it are to be searched,
 /// `diagnose/features.rs` and `words::diagnose::is_plain`.
-pub const VARIABLES: [&str; 55] = [
+pub const VARIABLES: [&str; 58] = [
     "X", "Y", "Z", "A", "B", "C", "t", "T", "nx", "ny", "nz", "mx", "my", "mz", "sX", "sY", "sZ", "sA", "sB", "sC",
     "feed", "S", "gx", "gy", "gz", "L", "L0", "bx", "by", "bz", "px", "py", "pz", "ox", "oy", "oz", "edge", "wA", "wB",
     "wC", "wayA", "wayB", "wayC", "speed1", "on1", "off1", "speed2", "on2", "off2", "speed3", "on3", "off3", "speed4",
-    "on4", "off4",
+    "on4", "off4", "hx", "hy", "hz",
 ];
 
 /// Where groups of variables begin in a [`State`].
@@ -53,10 +53,12 @@ pub mod slot {
     pub const WAY: usize = 40;
     /// `speed1 on1 off1 … off4`.
     pub const SPINDLE_RUNS: usize = 43;
+    /// `hx hy hz`.
+    pub const GRAVITY_AT_BLOCK: usize = 55;
 }
 
 /// Values of [`VARIABLES`] at one touch: X Y Z mm; A B C rad; t h; T °C; normals; senses ±1; feed mm/min; spindle rad;
-/// gravity in the tool's frame; lengths, point and edge mm; outward from the carrier's centre line; where the rotary axes
+/// gravity in the tool's frame and in the carrier's; lengths, point and edge mm; outward from the carrier's centre line; where the rotary axes
 /// stood before they came to their pose, rad (0 until they have moved), how far they have gone since their last reversal, rad;
 /// and the latest stretches in which the spindle ran (`model::spindle`).
 pub type State = [f64; VARIABLES.len()];

@@ -19,4 +19,5 @@ pub mod reference_points;
 mod rigid_motions;
 pub mod sensitivities;
 pub mod spindle;
+pub mod surface;
 pub mod temperatures;

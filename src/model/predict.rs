@@ -7,6 +7,7 @@
 //! g(θ) = n·(q − p) − r        q = E_block⁻¹ · (carrier chain)⁻¹ · E_base · (tool chain) · ball
 //! ```
 //!
+//! on a face; on a sphere or a cylinder it is the distance from the real surface (`surface.rs`),
 //! with the linear axes where they stood at contact: a trigger that comes late has let them go on by as much along the
 //! commanded line, against the planned normal. g = 0 at the true parameters θ. With θ = 0 it is the reading of the method
 //! (recorded less nominal, along the outward normal), so g is "measured less model", mm. Errors stand in the chain as
@@ -15,6 +16,7 @@
 use super::catalogue::{About, Effect, Place, Term};
 use super::formula::State;
 use super::reference_points::{Stated, own_frame, own_point, stated};
+use super::surface::{Body, Surface};
 use crate::axes::Position;
 use crate::machine::{Axis, Carrier, Machine, Side};
 use nalgebra::{Matrix3, Vector3};
@@ -73,6 +75,8 @@ pub struct SetUp {
     pub label: String,
     /// What bears it.
     pub carrier: Carrier,
+    /// What is unknown of its place.
+    pub body: Body,
     /// Its nominal centre in the carrier's frame, mm.
     pub centre: Vector3<f64>,
     /// The runs in which it was touched, from 0.
@@ -103,6 +107,8 @@ pub struct Observation {
     pub point: Vector3<f64>,
     /// Outward unit normal.
     pub normal: Vector3<f64>,
+    /// What was touched.
+    pub surface: Surface,
     pub ball_radius: f64,
     /// Ball's centre at zero, in R.
     pub ball_at_zero: Vector3<f64>,
@@ -132,19 +138,27 @@ pub(super) struct Active {
     pub set_up: Option<usize>,
     /// The run that it is of.
     pub run: Option<usize>,
+    /// By set-up: does it act on this body? Empty: on all.
+    pub on: Vec<bool>,
 }
 
 impl Active {
     /// Does it act on a touch?
     #[inline]
     pub fn acts_on(&self, touch: &Observation) -> bool {
-        self.set_up.is_none_or(|own| own == touch.set_up) && self.run.is_none_or(|own| own == touch.run)
+        self.is_seen_at(touch.set_up) && self.run.is_none_or(|own| own == touch.run)
+    }
+
+    /// Does it act on touches of this body?
+    #[inline]
+    pub fn is_seen_at(&self, set_up: usize) -> bool {
+        self.set_up.is_none_or(|own| own == set_up) && self.on.get(set_up).is_none_or(|acts| *acts)
     }
 
     /// Its formula's value where that is one number at all touches of its block.
     #[inline]
     pub fn constant(&self) -> Option<f64> {
-        self.term.formula.constant().filter(|_| self.run.is_none())
+        self.term.formula.constant().filter(|_| self.run.is_none() && self.on.is_empty())
     }
 }
 
@@ -166,7 +180,8 @@ fn runs_of(set_ups: &[SetUp]) -> Vec<usize> {
 /// The sets of parameters that an effect has where these blocks stand.
 fn instances_of(effect: &Effect, set_ups: &[SetUp]) -> Vec<Instance> {
     if effect.per_block {
-        return (0..set_ups.len()).map(|s| Instance { set_up: Some(s), run: None }).collect();
+        let has = |s: &usize| effect.of.is_empty() || effect.of.contains(&set_ups[*s].body);
+        return (0..set_ups.len()).filter(has).map(|s| Instance { set_up: Some(s), run: None }).collect();
     }
     if effect.per_run {
         return runs_of(set_ups).into_iter().skip(1).map(|run| Instance { set_up: None, run: Some(run) }).collect();
@@ -341,7 +356,13 @@ impl Model {
         }
         for term in &effect.terms {
             let slot = self.slot(machine, term.place, stated(machine, effect, term));
-            let changes = match (term.formula.constant().filter(|_| run.is_none()), set_up) {
+            // an effect of some bodies that has one set of parameters for all of them
+            let on: Vec<bool> = match set_up {
+                None if !effect.of.is_empty() => self.set_ups.iter().map(|s| effect.of.contains(&s.body)).collect(),
+                _ => Vec::new(),
+            };
+            let everywhere = term.formula.constant().filter(|_| run.is_none() && on.is_empty());
+            let changes = match (everywhere, set_up) {
                 (None, _) => Changes::WithTouch,
                 (Some(_), Some(_)) => Changes::WithSetUp,
                 (Some(_), None) => Changes::Never,
@@ -359,6 +380,7 @@ impl Model {
                     term: term.clone(),
                     set_up,
                     run,
+                    on: on.clone(),
                 });
             };
             act(term.component, factor);

@@ -9,6 +9,7 @@ use crate::fit::solve::observe;
 use crate::machine::{Carrier, Machine};
 use crate::model::catalogue::Catalogue;
 use crate::model::predict::{Model, Observation, SetUp};
+use crate::model::surface::{Body, Surface};
 use nalgebra::{DMatrix, Vector3};
 
 /// One statement: so many unknowns, of this rank.
@@ -71,7 +72,13 @@ fn rank(machine: &Machine, catalogue: &Catalogue, unknowns: &[&str], measured: &
                 .ok_or_else(|| Failure::new("paper::unknown", format!("{id} does not apply to {}", machine.name)))
         })
         .collect::<Result<_>>()?;
-    let set_up = SetUp { label: "datum".into(), carrier: Carrier::Table, centre: Vector3::zeros(), runs: vec![0] };
+    let set_up = SetUp {
+        label: "datum".into(),
+        carrier: Carrier::Table,
+        body: Body::Box,
+        centre: Vector3::zeros(),
+        runs: vec![0],
+    };
     let model = Model::new(machine, &effects, std::slice::from_ref(&set_up), machine.reference.pivot);
     let mut jacobian = DMatrix::zeros(measured.len(), model.n_unknowns());
     let mut row = vec![0.0; model.n_unknowns()];
@@ -89,6 +96,7 @@ fn rank(machine: &Machine, catalogue: &Catalogue, unknowns: &[&str], measured: &
             set_up: 0,
             point,
             normal,
+            surface: Surface::Plane { point, normal },
             ball_radius: 0.0,
             ball_at_zero: machine.tool.ball_at_zero(machine.tool.length_mm),
             position,

@@ -41,6 +41,9 @@ pub struct File {
     /// Places of the points on a face.
     #[serde(default)]
     pub grid: Vec<Grid>,
+    /// Directions in which what is round is touched.
+    #[serde(default)]
+    pub ring: Vec<Ring>,
     /// The stages of the procedure, in the order in which they are run.
     #[serde(default)]
     pub stage: Vec<Stage>,
@@ -83,6 +86,27 @@ pub struct Grid {
     #[serde(default)]
     pub v: Vec<f64>,
     /// Instead of `v`, side faces only: mm down from the upper edge.
+    #[serde(default)]
+    pub depth: Vec<f64>,
+}
+
+/// Points on a sphere, a cylinder or in a bore: all combinations of `azimuth_deg` with `elevation_deg` or with `depth`
+/// (`azimuth_deg` changes slowest).
+///
+/// Azimuth counts from +X towards +Y, elevation from the equator up, in the frame that `faces_in` names. On cylinders and in
+/// bores azimuths are always those of the body itself.
+#[derive(Debug, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Ring {
+    /// Short name.
+    #[schemars(with = "String")]
+    pub name: Spanned<String>,
+    /// Directions from the middle, deg.
+    pub azimuth_deg: Vec<f64>,
+    /// Spheres: height over the equator, deg; 90 is the pole.
+    #[serde(default)]
+    pub elevation_deg: Vec<f64>,
+    /// Cylinders and bores: mm down from the upper end.
     #[serde(default)]
     pub depth: Vec<f64>,
 }
@@ -159,14 +183,18 @@ impl Angles {
     }
 }
 
-/// Faces that are touched on one grid.
+/// Faces that are touched on one grid, or a ring of points on what is round.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TouchGroup {
     /// `+X`, `-X`, `+Y`, `-Y`, `+Z`, `-Z`, in order.
+    #[serde(default)]
     #[schemars(with = "Vec<String>")]
     pub faces: Vec<Spanned<String>>,
     /// Name of a grid of this file.
-    #[schemars(with = "String")]
-    pub grid: Spanned<String>,
+    #[schemars(with = "Option<String>")]
+    pub grid: Option<Spanned<String>>,
+    /// Instead of faces and grid: name of a ring of this file.
+    #[schemars(with = "Option<String>")]
+    pub ring: Option<Spanned<String>>,
 }

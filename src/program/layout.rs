@@ -3,10 +3,11 @@
 
 use super::as_written::FacesIn;
 use super::parts::Part;
-use super::spec::{Across, At, Face, FaceGrid, MOST_TOUCHES, ProgramSpec, SetupSpec};
+use super::ring_points;
+use super::spec::{Across, At, Face, FaceGrid, MOST_TOUCHES, ProgramSpec, RingPoints, SetupSpec};
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Failure, Finding, Findings, Result};
-use crate::machine::{Block, Machine, Mounting};
+use crate::machine::{Block, Form, Machine, Mounting};
 use crate::units::Plain;
 use nalgebra::{Rotation3, Vector3};
 
@@ -15,11 +16,11 @@ use nalgebra::{Rotation3, Vector3};
 pub struct Target {
     /// Place of the block in the mounting.
     pub block: usize,
-    /// The block's own face.
-    pub face: Face,
+    /// The block's own face; on what is round the direction.
+    pub face: String,
     /// Nominal contact.
     pub point: Vector3<f64>,
-    /// Outward unit normal: an axis of the carrier's frame.
+    /// Unit normal that points out of the material; on faces an axis of the carrier's frame.
     pub normal: Vector3<f64>,
 }
 
@@ -175,14 +176,27 @@ impl<'a> Check<'a> {
                 machine.carrier_frame(block.carrier, &pose.position()).rotation.inverse().to_rotation_matrix()
             }
         };
-        let targets = blocks
-            .iter()
-            .flat_map(|&b| spec.faces.iter().map(move |f| (b, f)))
-            .flat_map(|(b, faces)| match &mounting.blocks.get(b) {
-                Some(block) => self.face(b, block, faces, &to_carrier(block), spec),
-                None => Vec::new(),
-            })
-            .collect();
+        let mut targets = Vec::new();
+        for (b, block) in blocks.iter().filter_map(|&b| Some((b, mounting.blocks.get(b)?))) {
+            let turned = to_carrier(block);
+            let before = targets.len();
+            if matches!(block.form, Form::Box | Form::Plane | Form::Cylinder) {
+                for faces in &spec.faces {
+                    targets.extend(self.face(b, block, faces, &turned, spec));
+                }
+            }
+            if block.form.is_round() {
+                for ring in &spec.rings {
+                    targets.extend(self.ring(b, block, ring, &turned));
+                }
+            }
+            if targets.len() == before && !self.findings.has_errors() {
+                let says =
+                    format!("nothing that the set-up names is on block {:?}, a {}", block.name, block.form.as_str());
+                let help = if block.form.is_round() { "add { ring = \"…\" }" } else { "add faces and a grid" };
+                self.push_once(self.spec.error(&spec.pose.span, "program::nothing_on_block", says, help.to_owned()));
+            }
+        }
         Setup { spec, part: spec.part, pose, targets }
     }
 
@@ -246,13 +260,32 @@ impl<'a> Check<'a> {
             return Vec::new();
         };
         let half = |d: &Vector3<f64>| block.size.component_mul(&d.abs()).sum() / 2.0;
+        let flat = match block.form {
+            Form::Box => true,
+            Form::Plane => normal == Vector3::z(),
+            _ => normal.z != 0.0,
+        };
+        if !flat {
+            let own = Face::from_normal(&normal);
+            self.push_once_per_place(self.spec.error(
+                &named.face.span,
+                "program::no_face",
+                format!("block {:?}, a {}, has no face {own}", block.name, block.form.as_str()),
+                "a plane has +Z only, a cylinder its ends: touch its side with a ring".to_owned(),
+            ));
+            return Vec::new();
+        }
         let mut out = Vec::new();
         for &(along_u, across) in &named.points {
             let along_v = match across {
                 Across::FromCentre(mm) => mm,
                 Across::Depth(mm) => half(&v) - mm,
             };
-            let to_edge = (half(&u) - along_u.abs()).min(half(&v) - along_v.abs());
+            let to_edge = match block.diameter {
+                // the end of a cylinder
+                Some(diameter) => diameter / 2.0 - along_u.hypot(along_v),
+                None => (half(&u) - along_u.abs()).min(half(&v) - along_v.abs()),
+            };
             if to_edge < 0.0 {
                 let past = if to_edge < -1e9 { format!("{:e}", -to_edge) } else { format!("{:.3}", -to_edge) };
                 self.push_once_per_place(self.spec.error(
@@ -276,7 +309,25 @@ impl<'a> Check<'a> {
                 self.push_once_per_place(finding);
             }
             let point = block.centre + normal * half(&normal) + u * along_u + v * along_v;
-            out.push(Target { block: b, face: Face::from_normal(&normal), point, normal });
+            out.push(Target { block: b, face: Face::from_normal(&normal).to_string(), point, normal });
+        }
+        out
+    }
+}
+
+impl Check<'_> {
+    /// The targets of a ring, `to_carrier` turning the program's frame into the carrier's.
+    fn ring(&mut self, b: usize, block: &Block, ring: &RingPoints, to_carrier: &Rotation3<f64>) -> Vec<Target> {
+        let mut out = Vec::new();
+        for &(azimuth_deg, along) in &ring.points {
+            match ring_points::place(block, azimuth_deg, along, to_carrier) {
+                Ok(p) => out.push(Target { block: b, face: p.label, point: p.point, normal: p.normal }),
+                Err(reason) => {
+                    let says = format!("ring {:?} does not fit block {:?}: {reason}", ring.name.value, block.name);
+                    let help = format!("block {:?} is a {}", block.name, block.form.as_str());
+                    self.push_once_per_place(self.spec.error(&ring.name.span, "program::ring", says, help));
+                }
+            }
         }
         out
     }

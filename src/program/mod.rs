@@ -17,6 +17,7 @@ pub mod plan_check;
 pub mod plan_digest;
 mod plan_without_path;
 mod reach;
+pub mod ring_points;
 mod rotary_turns;
 mod route;
 pub mod scene;

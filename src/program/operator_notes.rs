@@ -6,7 +6,7 @@ use super::route::Routed;
 use super::spec::ProgramSpec;
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::machine::as_written::Toward;
-use crate::machine::{Block, Machine, Side};
+use crate::machine::{Block, Form, Machine, Side};
 use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -135,7 +135,15 @@ fn towards(direction: &Vector3<f64>) -> String {
 fn block_lines(machine: &Machine, block: &Block) -> Vec<String> {
     let top = block.centre + Vector3::z() * (block.size.z / 2.0 + machine.probe.ball_radius);
     let at = machine.linear_for_ball(block.carrier, &Position::default(), &top, machine.tool.length_mm);
-    let mut line = format!("  block {}: {} x {} x {} mm", block.name, block.size.x, block.size.y, block.size.z);
+    let edges = format!("{} x {} x {} mm", block.size.x, block.size.y, block.size.z);
+    let across = block.diameter.unwrap_or_default();
+    let mut line = match block.form {
+        Form::Box => format!("  block {}: {edges}", block.name),
+        Form::Plane => format!("  plane {}: {edges}", block.name),
+        Form::Sphere => format!("  sphere {}: {across} mm across", block.name),
+        Form::Cylinder => format!("  cylinder {}: {across} mm across, {} mm high", block.name, block.size.z),
+        Form::Bore => format!("  bore {}: {across} mm across, in a body of {edges}", block.name),
+    };
     if let Some(riser) = &block.riser {
         line.push_str(&format!(", on a riser {} mm high", riser.height));
         if let Some(toward) = riser.toward.filter(|t| *t != Toward::MinusZ) {
@@ -146,7 +154,12 @@ fn block_lines(machine: &Machine, block: &Block) -> Vec<String> {
     if let Some(at) = at {
         let shown = [AxisName::X, AxisName::Y, AxisName::Z]
             .map(|a| format!("{a} {:.3}", at.get(a) + machine.origin.get(a).unwrap_or(0.0) + 0.0));
-        lines.push(format!("    the ball rests on the middle of its upper face at {}", shown.join(" ")));
+        let stands = match block.form {
+            Form::Sphere => "the ball rests on its highest point",
+            Form::Bore => "the ball stands over the middle of the hole, its lowest point level with the rim,",
+            _ => "the ball rests on the middle of its upper face",
+        };
+        lines.push(format!("    {stands} at {}", shown.join(" ")));
     }
     lines
 }
@@ -240,7 +253,8 @@ fn losses_of(layout: &Layout, setup: &Setup, made: &BTreeSet<(&str, &str)>) -> V
     }
     // by the direction of the face, over all blocks: a relation needs one block on each side
     let mut sides: BTreeMap<usize, [(bool, bool); 2]> = BTreeMap::new();
-    for (block, face, normal) in &wanted {
+    // a point of what is round has no opposite face
+    for (block, face, normal) in wanted.iter().filter(|(_, face, _)| face.starts_with(['+', '-'])) {
         let axis = normal.iamax();
         let side = sides.entry(axis).or_default();
         let one = &mut side[usize::from(normal[axis] > 0.0)];

@@ -145,8 +145,10 @@ pub(super) fn plan_blocks(parts: &[Part]) -> Vec<PlanBlock> {
                 name: b.name.clone(),
                 carrier: b.carrier.to_string(),
                 mounting: (Some(part.label.as_str()) != first).then(|| part.label.clone()),
+                form: b.form,
                 centre: b.centre.into(),
                 size: b.size.into(),
+                diameter: b.diameter,
             })
         })
         .collect()

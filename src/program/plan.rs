@@ -3,6 +3,7 @@
 use super::plan_digest::{self, Fields};
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Findings, Result, Source, from_json};
+use crate::machine::Form;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -97,7 +98,7 @@ impl ControllerFrame {
     }
 }
 
-/// A block as the plan knows it, in the carrier's frame.
+/// A body that is touched as the plan knows it, in the carrier's frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlanBlock {
     /// Short name.
@@ -107,10 +108,16 @@ pub struct PlanBlock {
     /// Its mounting, where it differs from the plan's.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub mounting: Option<String>,
+    /// What it is; without it a box.
+    #[serde(default, skip_serializing_if = "Form::is_box")]
+    pub form: Form,
     /// Its centre, mm.
     pub centre: [f64; 3],
-    /// Its full edges, mm.
+    /// Full edges of the box that holds it, mm.
     pub size: [f64; 3],
+    /// Of a sphere, a cylinder or a hole, mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub diameter: Option<f64>,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -129,7 +136,7 @@ pub struct PlanTouch {
     pub mounting: Option<String>,
     /// The block's name.
     pub block: String,
-    /// The block's own face at all axes 0.
+    /// The block's own face at all axes 0; on what is round the direction: azimuth and elevation, deg.
     pub face: String,
     /// Nominal contact in the carrier's frame, mm.
     pub point: [f64; 3],

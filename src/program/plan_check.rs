@@ -3,7 +3,7 @@
 use super::plan::{FORMAT, Plan, PlanBlock, PlanTouch};
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Finding, Findings, Source, in_json};
-use crate::machine::{BallPlaces, Machine};
+use crate::machine::{BallPlaces, Form, Machine};
 use crate::units::Plain;
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
@@ -23,6 +23,9 @@ const AGREES_AS_GENERATED_MM: f64 = 0.002;
 
 /// The same in other plans, which may hold fewer digits than they were computed with.
 const AGREES_MM: f64 = 0.05;
+
+/// Points of what is round lie on its surface to this, mm.
+const ROUND_MM: f64 = 0.001;
 
 /// Positions may be this far beyond the ranges of the axes, mm and deg: a description may have changed since the plan was made.
 const BEYOND_RANGE_MM: f64 = 100.0;
@@ -152,6 +155,18 @@ fn check_block(faults: &mut Faults, i: usize, block: &PlanBlock) {
         let says = format!("size is {:?}, expected three edges of more than 0 and up to {LARGEST} mm", block.size);
         faults.add("plan::block_size", (Part::Block(i), "size"), AGAIN, says);
     }
+    let fits = match (block.form.is_round(), block.diameter) {
+        (false, given) => given.is_none(),
+        (true, None) => false,
+        // a sphere and a cylinder fill the box that holds them, a hole is narrower
+        (true, Some(mm)) if block.form == Form::Bore => mm > 0.0 && mm < block.size[0].min(block.size[1]),
+        (true, Some(mm)) => (mm - block.size[0]).abs() < AGREES_MM && (mm - block.size[1]).abs() < AGREES_MM,
+    };
+    if !fits {
+        let given = block.diameter.map_or_else(|| "no diameter".to_owned(), |mm| format!("diameter {} mm", Plain(mm)));
+        let says = format!("{} of size {:?} has {given}", block.form.as_str(), block.size);
+        faults.add("plan::block_form", (Part::Block(i), "size"), AGAIN, says);
+    }
 }
 
 fn check_touch(faults: &mut Faults, part: Part, touch: &PlanTouch) {
@@ -266,6 +281,21 @@ fn on_block(faults: &mut Faults, part: Part, touch: &PlanTouch, block: &PlanBloc
     if off > within_mm {
         let says = format!("point is {off:.3} mm outside of block {:?}", block.name);
         faults.add("plan::off_block", (part, "point"), AGAIN, says);
+    }
+    // on what is round the normal goes through the middle: a part in a thousand of the radius is a touch of something else
+    if let Some(radius) = block.diameter.map(|d| d / 2.0) {
+        let normal = Vector3::from(touch.normal);
+        let mut arm = Vector3::from(touch.point) - Vector3::from(block.centre);
+        let on_end = block.form != Form::Sphere && normal.z.abs() > 0.5;
+        let outward = if block.form == Form::Bore { -normal } else { normal };
+        if block.form != Form::Sphere {
+            arm.z = 0.0;
+        }
+        let off = (arm - outward * radius).norm();
+        if !on_end && off > ROUND_MM {
+            let says = format!("point and normal are {off:.3} mm off the surface of {:?}", block.name);
+            faults.add("plan::off_block", (part, "point"), AGAIN, says);
+        }
     }
 }
 

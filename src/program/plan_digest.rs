@@ -39,7 +39,14 @@ const OF_BLOCKS: [(&str, OfBlock); 5] = [
     ("blocks.carrier", |c, b| c.text(&b.carrier)),
     ("blocks.mounting", |c, b| c.text(b.mounting.as_deref().unwrap_or_default())),
     ("blocks.centre", |c, b| c.numbers(&b.centre)),
-    ("blocks.size", |c, b| c.numbers(&b.size)),
+    ("blocks.size", |c, b| {
+        c.numbers(&b.size);
+        // plans of boxes keep the digest that they always had
+        if !b.form.is_box() {
+            c.text(b.form.as_str());
+            c.maybe(b.diameter);
+        }
+    }),
 ];
 
 const OF_TOUCHES: [(&str, OfTouch); 21] = [

@@ -6,7 +6,7 @@
 use crate::axes::{AxisName, Position};
 use crate::diag::{Failure, Result};
 use crate::geometry::{Transform, apply, rotation_about};
-use crate::machine::{Axis, Carrier, Machine, Mounting, Shape, Side};
+use crate::machine::{Axis, Block, Carrier, Form, Machine, Mounting, Shape, Side};
 use nalgebra::{Isometry3, Translation3, Unit, UnitQuaternion, Vector3};
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::{Pose, Rot3, Vec3};
@@ -82,6 +82,54 @@ impl Solid {
             Isometry3::from_parts(Translation3::from(centre), turn),
             radius.hypot(height / 2.0),
         )
+    }
+
+    /// A body that is touched: one convex solid, a hole as the wedges round it.
+    fn of_body(block: &Block) -> Vec<Self> {
+        let radius = block.diameter.unwrap_or_default() / 2.0;
+        match block.form {
+            Form::Box | Form::Plane => vec![Self::cuboid(block.centre, block.size)],
+            Form::Sphere => vec![Self::ball(block.centre, radius)],
+            Form::Cylinder => {
+                let foot = block.centre - Vector3::z() * (block.size.z / 2.0);
+                vec![Self::cylinder(foot, &Vector3::z_axis(), radius, block.size.z)]
+            }
+            Form::Bore => Self::round_a_hole(block.centre, block.size, radius),
+        }
+    }
+
+    /// The box round a hole, cut into wedges. Their inner faces are chords of the hole: they stand a little inside of its wall, never
+    /// outside.
+    fn round_a_hole(centre: Vector3<f64>, size: Vector3<f64>, radius: f64) -> Vec<Self> {
+        /// A chord of the hole stands inside of its wall by radius * (1 - cos(pi / 32)): half a percent.
+        const WEDGES: u32 = 32;
+        let half = size / 2.0;
+        let direction = |k: u32| {
+            let angle = std::f64::consts::TAU * f64::from(k) / f64::from(WEDGES);
+            Vector3::new(angle.cos(), angle.sin(), 0.0)
+        };
+        // where a ray from the middle leaves the box; corners of the box lie on rays of their own where it is square
+        let border = |d: &Vector3<f64>| d * (half.x / d.x.abs()).min(half.y / d.y.abs());
+        let corner = |a: &Vector3<f64>, b: &Vector3<f64>| {
+            let at = Vector3::new(half.x.copysign(a.x + b.x), half.y.copysign(a.y + b.y), 0.0);
+            let (from, to) = (a.y.atan2(a.x), b.y.atan2(b.x));
+            let to = if to < from { to + std::f64::consts::TAU } else { to };
+            let own = at.y.atan2(at.x);
+            let own = if own < from { own + std::f64::consts::TAU } else { own };
+            (own > from && own < to).then_some(at)
+        };
+        (0..WEDGES)
+            .filter_map(|k| {
+                let (a, b) = (direction(k), direction(k + 1));
+                let mut flat = vec![a * radius, b * radius, border(&a), border(&b)];
+                flat.extend(corner(&a, &b));
+                let points: Vec<Vec3> =
+                    flat.iter().flat_map(|p| [-half.z, half.z].map(|z| Vec3::new(p.x, p.y, p.z + z))).collect();
+                let reach = flat.iter().map(|p| p.norm().hypot(half.z)).fold(0.0, f64::max);
+                let shape = SharedShape::convex_hull(&points)?;
+                Some(Self::new(shape, Translation3::from(centre).into(), reach))
+            })
+            .collect()
     }
 
     /// Centre of the sphere that holds it, in R, mm.
@@ -168,8 +216,9 @@ impl<'m> Scene<'m> {
 
         let mut scene = Self { machine, parts, obstacles: Vec::new(), carriers: vec![mounting.carrier], slack_mm: 0.0 };
         for (i, block) in mounting.blocks.iter().enumerate() {
-            let solid = Solid::cuboid(block.centre, block.size);
-            scene.add(format!("block {}", block.name), Role::Block(i), block.carrier, solid);
+            for solid in Solid::of_body(block) {
+                scene.add(format!("block {}", block.name), Role::Block(i), block.carrier, solid);
+            }
         }
         for (role, solids) in [(Role::Mounted, &mounting.solids), (Role::Fixed, &machine.solids)] {
             for s in solids {

@@ -113,6 +113,23 @@ pub struct FaceGrid {
     pub grid: At<String>,
 }
 
+/// Where a point of a ring lies besides its azimuth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Along {
+    /// On a sphere: over the equator, deg.
+    Elevation(f64),
+    /// On a cylinder or in a bore: down from the upper end, mm.
+    Depth(f64),
+}
+
+/// Points on what is round.
+#[derive(Debug, Clone)]
+pub struct RingPoints {
+    pub name: At<String>,
+    /// Azimuth, deg, and the second coordinate.
+    pub points: Vec<(f64, Along)>,
+}
+
 /// A set-up in one pose.
 #[derive(Debug, Clone)]
 pub struct SetupSpec {
@@ -132,8 +149,10 @@ pub struct SetupSpec {
     pub repeats: u32,
     /// The blocks; `None`: all of the mounting.
     pub blocks: Option<Vec<At<String>>>,
-    /// What is touched on each.
+    /// What is touched on each that has faces.
     pub faces: Vec<FaceGrid>,
+    /// What is touched on each that is round.
+    pub rings: Vec<RingPoints>,
 }
 
 /// A checked program. Lengths mm, angles deg.
@@ -178,6 +197,12 @@ pub fn load(source: &Source) -> Result<(ProgramSpec, Findings)> {
     check.findings.finish(spec)
 }
 
+/// What a program names once and uses by name.
+struct Named {
+    grids: Vec<(String, Vec<GridPoint>, bool)>,
+    rings: Vec<(String, Vec<(f64, Along)>)>,
+}
+
 struct Check<'a> {
     source: &'a Source,
     findings: Findings,
@@ -215,7 +240,7 @@ impl Check<'_> {
                 "write an angle above 0 and up to 90",
             );
         }
-        let grids = self.grids(&f.grid);
+        let named = Named { grids: self.grids(&f.grid), rings: self.rings(&f.ring) };
         let repeats = self.repeats(f.repeats.as_ref()).unwrap_or(1);
         let (mut setups, mut parts) = (Vec::new(), Vec::new());
         if f.stage.is_empty() {
@@ -240,7 +265,7 @@ impl Check<'_> {
             let stylus = stage.stylus.as_ref().or(f.stylus.as_ref());
             let part = part_of(&mut parts, mounting.into(), stylus.map(At::from), stage.placed);
             for setup in &stage.setup {
-                self.setup((stage.name.get_ref(), part), repeats, setup, &grids, &mut setups);
+                self.setup((stage.name.get_ref(), part), repeats, setup, &named, &mut setups);
             }
         }
         if parts.is_empty() {
@@ -312,12 +337,64 @@ impl Check<'_> {
         out
     }
 
+    fn rings(&mut self, written: &[w::Ring]) -> Vec<(String, Vec<(f64, Along)>)> {
+        let mut out: Vec<(String, Vec<(f64, Along)>)> = Vec::new();
+        for r in written {
+            let name = r.name.get_ref();
+            if out.iter().any(|(n, _)| n == name) {
+                self.error(
+                    r.name.span(),
+                    "program::ring_twice",
+                    format!("ring {name:?} stands twice"),
+                    "give each ring a name of its own",
+                );
+            }
+            let steep = |deg: &f64| !(-90.0..=90.0).contains(deg);
+            let odd = |x: &f64| !x.is_finite();
+            if r.azimuth_deg.is_empty()
+                || r.elevation_deg.is_empty() == r.depth.is_empty()
+                || r.elevation_deg.iter().any(steep)
+                || r.azimuth_deg.iter().chain(&r.depth).any(odd)
+            {
+                self.error(
+                    r.name.span(),
+                    "program::ring",
+                    format!("ring {name:?} needs azimuth_deg, and either elevation_deg (-90 to 90) or depth"),
+                    "write azimuth_deg = [..] and elevation_deg = [..] for spheres, azimuth_deg = [..] and depth = [..] in mm \
+                     from the upper end for cylinders and bores",
+                );
+                continue;
+            }
+            let along = || {
+                let elevations = r.elevation_deg.iter().map(|&deg| Along::Elevation(deg));
+                elevations.chain(r.depth.iter().map(|&mm| Along::Depth(mm)))
+            };
+            let points = r.azimuth_deg.iter().flat_map(|&azimuth| along().map(move |v| (azimuth, v))).collect();
+            out.push((name.clone(), points));
+        }
+        out
+    }
+
+    fn ring(&mut self, written: &toml::Spanned<String>, rings: &[(String, Vec<(f64, Along)>)]) -> Option<RingPoints> {
+        let found = rings.iter().find(|(name, _)| name == written.get_ref());
+        if found.is_none() {
+            let names: Vec<&str> = rings.iter().map(|(n, _)| n.as_str()).collect();
+            self.error(
+                written.span(),
+                "program::unknown_ring",
+                format!("no ring is called {:?}", written.get_ref()),
+                format!("the file has: {}", names.join(", ")),
+            );
+        }
+        found.map(|(_, points)| RingPoints { name: At::from(written), points: points.clone() })
+    }
+
     fn setup(
         &mut self,
         (stage, part): (&str, usize),
         repeats: u32,
         s: &w::Setup,
-        grids: &[(String, Vec<GridPoint>, bool)],
+        named: &Named,
         out: &mut Vec<SetupSpec>,
     ) {
         let poses = self.poses(&s.pose);
@@ -347,9 +424,18 @@ impl Check<'_> {
                 "write touch = [{ faces = [\"+Z\"], grid = \"…\" }], and name at least one block or leave blocks out",
             );
         }
-        let mut faces = Vec::new();
+        let (mut faces, mut rings) = (Vec::new(), Vec::new());
         for group in &s.touch {
-            self.touch_group(group, grids, &mut faces);
+            match (&group.ring, &group.grid) {
+                (Some(ring), None) if group.faces.is_empty() => rings.extend(self.ring(ring, &named.rings)),
+                (None, Some(grid)) => self.touch_group(group, grid, &named.grids, &mut faces),
+                _ => self.error(
+                    s.pose.span(),
+                    "program::touch",
+                    "what is touched is either faces with a grid, or a ring",
+                    "write { faces = [\"+Z\"], grid = \"…\" } for a body with faces, { ring = \"…\" } for one that is round",
+                ),
+            }
         }
         if let Some(blocks) = &s.blocks {
             for (i, b) in blocks.iter().enumerate() {
@@ -374,6 +460,7 @@ impl Check<'_> {
                 repeats,
                 blocks: s.blocks.as_ref().map(|b| b.iter().map(At::from).collect()),
                 faces: faces.clone(),
+                rings: rings.clone(),
             });
         }
     }
@@ -381,28 +468,29 @@ impl Check<'_> {
     fn touch_group(
         &mut self,
         group: &w::TouchGroup,
+        written: &toml::Spanned<String>,
         grids: &[(String, Vec<GridPoint>, bool)],
         out: &mut Vec<FaceGrid>,
     ) {
-        let grid = grids.iter().find(|(name, ..)| name == group.grid.get_ref());
+        let grid = grids.iter().find(|(name, ..)| name == written.get_ref());
         if grid.is_none() {
             let names: Vec<&str> = grids.iter().map(|(n, ..)| n.as_str()).collect();
             self.error(
-                group.grid.span(),
+                written.span(),
                 "program::unknown_grid",
-                format!("no grid is called {:?}", group.grid.get_ref()),
+                format!("no grid is called {:?}", written.get_ref()),
                 format!("the file has: {}", names.join(", ")),
             );
         }
         if group.faces.is_empty() {
-            self.error(group.grid.span(), "program::empty", "no face is named", "write faces = [\"+Z\"]");
+            self.error(written.span(), "program::empty", "no face is named", "write faces = [\"+Z\"]");
         }
-        for written in &group.faces {
-            let Some(face) = Face::parse(written.get_ref()) else {
+        for face_word in &group.faces {
+            let Some(face) = Face::parse(face_word.get_ref()) else {
                 self.error(
-                    written.span(),
+                    face_word.span(),
                     "program::unknown_face",
-                    format!("there is no face {:?}", written.get_ref()),
+                    format!("there is no face {:?}", face_word.get_ref()),
                     "faces are +X, -X, +Y, -Y, +Z, -Z",
                 );
                 continue;
@@ -410,7 +498,7 @@ impl Check<'_> {
             let Some((name, points, depth)) = grid else { continue };
             if *depth && face.axis == 2 {
                 self.error(
-                    written.span(),
+                    face_word.span(),
                     "program::depth",
                     format!("grid {name:?} gives depths below an upper edge, and face {face} has none"),
                     "use a grid with u and v there",
@@ -418,9 +506,9 @@ impl Check<'_> {
                 continue;
             }
             out.push(FaceGrid {
-                face: At { value: face, span: written.span() },
+                face: At { value: face, span: face_word.span() },
                 points: points.clone(),
-                grid: At::from(&group.grid),
+                grid: At::from(written),
             });
         }
     }

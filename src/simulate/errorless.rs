@@ -2,7 +2,7 @@
 //! which axis positions a tool centre point means.
 
 use super::chain::{Chain, Stylus};
-use super::contact::{Contact, distance, first_contact};
+use super::contact::{Body, Contact, first_contact};
 use super::rigid::{Vec3, minus, norm, plus, solve};
 use super::terms::Shifts;
 use crate::axes::Position;
@@ -29,7 +29,7 @@ struct Block {
     name: String,
     links: usize,
     centre: Vec3,
-    half: Vec3,
+    body: Body,
 }
 
 /// Where a move meets a block.
@@ -51,7 +51,11 @@ impl Errorless {
             name: b.name.clone(),
             links: chain.links_to(b.carrier),
             centre: [b.centre.x, b.centre.y, b.centre.z],
-            half: [b.size.x / 2.0, b.size.y / 2.0, b.size.z / 2.0],
+            body: Body {
+                form: b.form,
+                half: [b.size.x / 2.0, b.size.y / 2.0, b.size.z / 2.0],
+                radius: b.diameter.unwrap_or_default() / 2.0,
+            },
         });
         Self {
             blocks: blocks.collect(),
@@ -70,7 +74,7 @@ impl Errorless {
     /// Does the ball touch a block here?
     #[must_use]
     pub fn touches(&self, at: &Position) -> bool {
-        self.blocks.iter().any(|b| distance(self.in_block(b, at), b.half).0 - self.radius_mm <= TOUCHING_MM)
+        self.blocks.iter().any(|b| b.body.distance(self.in_block(b, at)).0 - self.radius_mm <= TOUCHING_MM)
     }
 
     /// Where a straight move of linear axes first meets a block. A move that begins in contact meets it at 0.
@@ -91,12 +95,12 @@ impl Errorless {
             let (begin, end) = (place(0.0), place(1.0));
             if !turned {
                 let way = norm(minus(end, begin));
-                let gap = distance(begin, block.half).0.min(distance(end, block.half).0) - self.radius_mm;
+                let gap = block.body.distance(begin).0.min(block.body.distance(end).0) - self.radius_mm;
                 if gap > way {
                     continue;
                 }
             }
-            let part = match first_contact(&place, !turned, block.half, self.radius_mm) {
+            let part = match first_contact(&place, !turned, &block.body, self.radius_mm) {
                 Contact::Met { at, .. } => at,
                 Contact::Already(_) => 0.0,
                 Contact::Missed => continue,

@@ -8,7 +8,7 @@ use super::scenario::{BlockError, Scenario};
 use super::terms::{Shifts, Terms, TouchState};
 use crate::axes::{AxisName, Position};
 use crate::diag::{Failure, Finding, Findings, Result};
-use crate::machine::{Carrier, Machine};
+use crate::machine::{Carrier, Form, Machine};
 use crate::program::plan::{ControllerFrame, Plan, PlanBlock, PlanTouch};
 use crate::units::{hours_from_s, rad_from_deg};
 use std::collections::BTreeMap;
@@ -48,8 +48,11 @@ pub struct Ready {
     pub ball_radius_mm: f64,
     /// The block's centre in the carrier's frame, mm.
     pub centre: Vec3,
-    /// Half of its edges, mm.
+    pub form: Form,
+    /// Half edges of the box that holds it, mm.
     pub half: Vec3,
+    /// Of a cylinder or a hole, mm.
+    pub radius: f64,
     /// Planned place and size less real ones.
     pub wrong: Option<BlockError>,
     /// How much longer its half edges are than the plan says, beside that, mm.
@@ -239,7 +242,9 @@ fn ready(
         stylus,
         ball_radius_mm,
         centre: block.centre,
+        form: block.form,
         half: block.size.map(|s| 0.5 * s),
+        radius: 0.5 * block.diameter.unwrap_or(0.0),
         wrong: wrong_block(machine, plan, scenario, touch),
         longer_half: longer_half(scenario, &state.label),
         normal: touch.normal,
@@ -314,13 +319,25 @@ fn state(
         normal_carrier: normal,
         point: touch.point,
         outward: chain.outward_from_centre(n_links, block.centre),
-        edge_mm: (0..3).map(|i| block.size[i] * normal[i].abs()).sum(),
+        edge_mm: edge_mm(block, normal),
+        down_carrier: from.carrier.inward_direction([0.0, 0.0, -1.0]),
         label: if mounting.is_empty() {
             touch.block.as_str().into()
         } else {
             format!("{mounting}/{}", touch.block).into()
         },
         ..TouchState::default()
+    }
+}
+
+/// How long the body is along a normal, mm: what is round has its diameter, a hole a negative one.
+fn edge_mm(block: &PlanBlock, normal: Vec3) -> f64 {
+    let across = block.diameter.unwrap_or(0.0);
+    match block.form {
+        Form::Sphere => across,
+        Form::Cylinder if normal[2].abs() < 0.5 => across,
+        Form::Bore if normal[2].abs() < 0.5 => -across,
+        _ => (0..3).map(|i| block.size[i] * normal[i].abs()).sum(),
     }
 }
 

@@ -45,6 +45,8 @@ pub struct TouchState {
     pub normal_probe: Vec3,
     /// In the carrier's frame.
     pub normal_carrier: Vec3,
+    /// Down, unit vector in the carrier's frame.
+    pub down_carrier: Vec3,
     /// Planned contact in the carrier's frame, mm.
     pub point: Vec3,
     /// Unit vector from the carrier's centre line to the block's centre, in the carrier's frame; 0 on it.
@@ -78,6 +80,7 @@ impl Default for TouchState {
             normal_machine: [0.0; 3],
             normal_probe: [0.0; 3],
             normal_carrier: [0.0; 3],
+            down_carrier: [0.0, 0.0, -1.0],
             point: [0.0; 3],
             outward: [0.0; 3],
             edge_mm: 0.0,
@@ -129,6 +132,8 @@ pub enum Target {
     HalfSize(usize),
     /// The same in parts of the edge.
     HalfSizeRatio,
+    /// The radius of what is round, mm.
+    Radius,
     /// The block's place in its carrier, component 0 to 5.
     Block(usize),
     /// The block's place, away from the carrier's centre line, mm.
@@ -169,6 +174,14 @@ pub enum Shape {
     LobeCosine(f64),
     /// ρ·sin(k·φ).
     LobeSine(f64),
+    /// sᵏ·cos(k·φ), φ the azimuth of the touched place on its body, s its distance from the body's z axis over the radius.
+    FormCosine(i32),
+    /// sᵏ·sin(k·φ).
+    FormSine(i32),
+    /// How far the ball pushes its body along an axis of the carrier: the part of the push, against the normal.
+    Push(usize),
+    /// The part of gravity along an axis of the carrier.
+    CarrierGravity(usize),
     /// Feed, mm/s.
     Feed,
     /// The part of gravity across the stylus along a tool axis, times the square of the stylus's relative length.
@@ -246,6 +259,10 @@ impl Shape {
             Self::AxialApproach => dot(touch.approach_probe, touch.stylus_axis).powi(2),
             Self::LobeCosine(k) => lobe(touch.approach_probe, k).1,
             Self::LobeSine(k) => lobe(touch.approach_probe, k).0,
+            Self::FormCosine(k) => form_lobe(touch.normal_carrier, k).1,
+            Self::FormSine(k) => form_lobe(touch.normal_carrier, k).0,
+            Self::Push(i) => -touch.normal_carrier[i],
+            Self::CarrierGravity(i) => touch.down_carrier[i],
             Self::Feed => mm_s_from_mm_min(touch.feed_mm_min),
             Self::StylusGravity(i) => {
                 let along = dot(touch.down_tool, touch.stylus_axis);
@@ -273,6 +290,13 @@ fn lobe(approach: Vec3, k: f64) -> (f64, f64) {
     let across = approach[0].hypot(approach[1]);
     let (s, c) = (k * approach[1].atan2(approach[0])).sin_cos();
     (across * s, across * c)
+}
+
+/// Sine and cosine of k times the azimuth of a place on its body, times the k-th power of its sine from the z axis.
+fn form_lobe(normal: Vec3, k: i32) -> (f64, f64) {
+    let from_axis = normal[0].hypot(normal[1]).powi(k);
+    let (s, c) = (f64::from(k) * normal[1].atan2(normal[0])).sin_cos();
+    (from_axis * s, from_axis * c)
 }
 
 /// One thing that is wrong.
@@ -317,6 +341,8 @@ pub struct Shifts {
     pub half_size: Vec3,
     /// The same in parts of the edge.
     pub half_size_ratio: f64,
+    /// Radius of what is round, mm.
+    pub radius: f64,
     /// Displacement of the block in its carrier, mm and rad.
     pub block: [f64; 6],
     /// Displacement of the block outward, mm.
@@ -341,6 +367,7 @@ impl Shifts {
             Target::Late => self.late += value,
             Target::HalfSize(i) => self.half_size[i] += value,
             Target::HalfSizeRatio => self.half_size_ratio += value,
+            Target::Radius => self.radius += value,
             Target::Block(i) => self.block[i] += value,
             Target::BlockOutward => self.block_outward += value,
         }

@@ -1,12 +1,13 @@
 //! One touch: the search, the contact, the trigger, and what the log then says.
 
-use super::contact::{Contact, first_contact};
+use super::contact::{Body, Contact, first_contact};
 use super::control::Mapping;
 use super::prepare::{Bench, Ready};
 use super::rigid::{Rigid, Vec3, dot, minus, norm, plus};
 use super::terms::Shifts;
 use crate::axes::Position;
 use crate::log::{RawTouch, Status};
+use crate::machine::Form;
 
 /// A made touch.
 pub struct Outcome {
@@ -57,7 +58,7 @@ pub fn make(bench: &Bench<'_>, ready: &Ready) -> Outcome {
     // errors depend on where the axes stand, not on what was commanded
     let steady = bench.terms.during(&ready.state, &mapping.joints(&ready.start));
     let scatter = bench.dice.visit_mm(ready.visit);
-    let (block, half) = real_block(bench, ready, &steady);
+    let (block, body) = real_block(bench, ready, &steady);
     let ball_in = |block: &Rigid, joints: &Position, shifts: &Shifts| -> Vec3 {
         let place = bench.chain.place(joints, shifts, ready.n_links, ready.stylus);
         let ball = plus(place.ball, 1.0, scatter);
@@ -75,7 +76,7 @@ pub fn make(bench: &Bench<'_>, ready: &Ready) -> Outcome {
         ball_in(&real_block(bench, ready, &shifts).0, &joints, &shifts)
     };
     let straight = bench.terms.steady() && mapping.is_affine();
-    let (at, normal, faces) = match first_contact(&ball_in_block, straight, half, ready.ball_radius_mm) {
+    let (at, normal, faces) = match first_contact(&ball_in_block, straight, &body, ready.ball_radius_mm) {
         Contact::Met { at, normal, faces } => (at, normal, faces),
         Contact::Missed => return log(ready.end, Status::Miss, Some(Remark::Missed)),
         Contact::Already(depth) => return log(ready.start, Status::Miss, Some(Remark::Already(depth))),
@@ -130,8 +131,8 @@ fn commanded(ready: &Ready, s: f64) -> Position {
     out
 }
 
-/// The frame of the real block in its carrier (origin at its centre, axes along its edges) and its half edges, mm.
-fn real_block(bench: &Bench<'_>, ready: &Ready, shifts: &Shifts) -> (Rigid, Vec3) {
+/// The frame of the real block in its carrier (origin at its centre, axes along its edges) and what it really is, mm.
+fn real_block(bench: &Bench<'_>, ready: &Ready, shifts: &Shifts) -> (Rigid, Body) {
     let mut half = plus(plus(ready.half, shifts.half_size_ratio, ready.half), 1.0, shifts.half_size);
     half = plus(half, 1.0, ready.longer_half);
     let mut frame = Rigid::shift(ready.centre);
@@ -149,7 +150,12 @@ fn real_block(bench: &Bench<'_>, ready: &Ready, shifts: &Shifts) -> (Rigid, Vec3
     if six != [0.0; 6] {
         frame = frame.then(&Rigid::error(&six, [0.0; 3]));
     }
-    (frame, half)
+    // a sphere is larger by its half axes, a cylinder and a hole by their radius
+    if ready.form == Form::Sphere {
+        half = plus(half, shifts.radius, [1.0; 3]);
+    }
+    let radius = ready.radius * (1.0 + shifts.half_size_ratio) + shifts.radius;
+    (frame, Body { form: ready.form, half, radius })
 }
 
 /// As a log with few digits would hold it.

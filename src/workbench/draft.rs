@@ -377,7 +377,10 @@ pub const MEANING: [(&str, &str); VARIABLES.len()] = [
     ("ox", "from the carrier's centre line to the block, unit vector, x part"),
     ("oy", "the same, y part"),
     ("oz", "the same, z part"),
-    ("edge", "edge of the block along the touched face's normal, mm"),
+    (
+        "edge",
+        "length of the block along the touched face's normal, mm; of what is round its diameter, of a hole the negative one",
+    ),
     ("wA", "where A stood before it came to this place, radians"),
     ("wB", "the same of B"),
     ("wC", "the same of C"),
@@ -396,6 +399,9 @@ pub const MEANING: [(&str, &str); VARIABLES.len()] = [
     ("speed4", "the same of the fourth last"),
     ("on4", "the same of the fourth last"),
     ("off4", "the same of the fourth last"),
+    ("hx", "which way is down, in the frame of what carries the block, its x part"),
+    ("hy", "the same, its y part"),
+    ("hz", "the same, its z part: -1 while the table is level"),
 ];
 
 #[cfg(test)]
@@ -471,6 +477,10 @@ mod tests {
             set_up: 0,
             point: nalgebra::Vector3::zeros(),
             normal: nalgebra::Vector3::z(),
+            surface: crate::model::surface::Surface::Plane {
+                point: nalgebra::Vector3::zeros(),
+                normal: nalgebra::Vector3::z(),
+            },
             ball_radius: 3.0,
             ball_at_zero: nalgebra::Vector3::zeros(),
             position: crate::axes::Position::default(),

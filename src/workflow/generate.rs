@@ -105,7 +105,7 @@ pub fn prove(
 /// Location errors that the whole program could tell, with blocks of unknown set-up, and the touches that are left cannot.
 fn lost_parameters(machine: &Machine, spec: &ProgramSpec, plan: &Plan) -> Result<Vec<String>> {
     let catalogue = Catalogue::built_in()?;
-    let effects = default_effects(machine, false);
+    let effects = default_effects(machine, &[plan], false);
     let unseen = |plan: &Plan| -> Result<Vec<String>> {
         let touches: Vec<Touch> = plan
             .touches

@@ -4,7 +4,9 @@ use super::active_compensation::load_compensation;
 use super::{Environment, LogFile, load_effects, load_plan};
 use crate::diag::Result;
 use crate::fit::effects_of;
-use crate::machine::Machine;
+use crate::machine::{Form, Machine};
+use crate::model::surface::Surface;
+use crate::program::plan::{Plan, PlanBlock, PlanTouch};
 use crate::study::tolerance::Tolerance;
 use crate::study::{DataEntry, Study};
 use std::collections::BTreeMap;
@@ -76,17 +78,34 @@ impl NewStudy<'_> {
     }
 }
 
-/// What is on by default: the location errors of the machine's rotary axes, the blocks' set-up and the pre-travel.
+/// What is on by default: the location errors of the machine's rotary axes, where the touched bodies stand, and the pre-travel.
 #[must_use]
-pub fn default_effects(machine: &Machine, known_blocks: bool) -> Vec<String> {
+pub fn default_effects(machine: &Machine, plans: &[&Plan], known_blocks: bool) -> Vec<String> {
     let mut effects: Vec<String> =
         machine.rotary().map(|a| format!("location-{}", a.name.letter().to_ascii_lowercase())).collect();
     effects.sort();
     if !known_blocks {
-        effects.push("block-setup".into());
+        effects.extend(set_ups_of(plans).into_iter().map(str::to_owned));
     }
     effects.push("pretravel".into());
     effects
+}
+
+/// The effects that say where the touched bodies of plans stand.
+fn set_ups_of(plans: &[&Plan]) -> Vec<&'static str> {
+    let touched = || plans.iter().flat_map(|p| p.touches.iter().filter_map(|t| Some((p.block_of(t)?, t))));
+    let has = |form: &[Form]| touched().any(|(block, _)| form.contains(&block.form));
+    let round = |(block, touch): (&PlanBlock, &PlanTouch)| {
+        matches!(block.form, Form::Cylinder | Form::Bore) && matches!(Surface::of(block, touch), Surface::Plane { .. })
+    };
+    let all = [
+        ("block-setup", has(&[Form::Box])),
+        ("sphere-setup", has(&[Form::Sphere])),
+        ("cylinder-setup", has(&[Form::Cylinder, Form::Bore])),
+        ("cylinder-height", touched().any(round)),
+        ("plane-setup", has(&[Form::Plane])),
+    ];
+    all.into_iter().filter(|(_, there)| *there).map(|(id, _)| id).collect()
 }
 
 /// A controller as a study names it: its name, or its file as the study's folder sees it.

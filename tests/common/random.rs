@@ -14,8 +14,10 @@ pub fn random_plan(machine: &Machine, mounting: &Mounting, n_touches: usize, rng
         name: b.name.clone(),
         carrier: carrier.clone(),
         mounting: None,
+        form: b.form,
         centre: b.centre.into(),
         size: b.size.into(),
+        diameter: b.diameter,
     });
     let blocks: Vec<PlanBlock> = blocks.collect();
     let mut touches = Vec::new();

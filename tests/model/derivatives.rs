@@ -7,6 +7,7 @@ use axiscal::machine::{Carrier, Machine, Side};
 use axiscal::model::catalogue::Catalogue;
 use axiscal::model::formula::{State, slot};
 use axiscal::model::predict::{Model, Observation, SetUp};
+use axiscal::model::surface::{Body, Surface};
 use common::more_machines::all_machines;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
@@ -88,12 +89,20 @@ fn random_touch(machine: &Machine, carriers: &[Carrier], rng: &mut ChaCha8Rng) -
     let unit = |rng: &mut ChaCha8Rng| {
         Vector3::new(rng.random_range(-1.0..1.0), rng.random_range(-1.0..1.0), rng.random_range(0.1..1.0)).normalize()
     };
+    let (point, normal) = (unit(rng) * 40.0, unit(rng));
+    // the ball is far from where it touches: a body as far away has the curvature that matters
+    let surface = match rng.random_range(0..3) {
+        0 => Surface::Plane { point, normal },
+        1 => Surface::Sphere { centre: point - normal * 12.5, radius: 12.5 },
+        _ => Surface::Cylinder { centre: point - normal * 12.5, radius: 12.5, sense: -1.0 },
+    };
     let mut touch = Observation {
         run: 0,
         id: 1,
         set_up: rng.random_range(0..carriers.len()),
-        point: unit(rng) * 40.0,
-        normal: unit(rng),
+        point,
+        normal,
+        surface,
         ball_radius: 3.0,
         ball_at_zero: machine.tool.ball_at_zero(180.0),
         position,
@@ -126,6 +135,7 @@ fn analytic_derivatives_agree_with_central_differences_for_every_effect_and_mach
             .map(|(i, c)| SetUp {
                 label: format!("b{i}"),
                 carrier: *c,
+                body: [Body::Box, Body::Sphere, Body::CylinderWithEnd][i % 3],
                 centre: Vector3::new(30.0, -10.0, -200.0),
                 runs: vec![0, 1],
             })

@@ -7,6 +7,7 @@ use axiscal::machine::{Carrier, Machine};
 use axiscal::model::catalogue::Catalogue;
 use axiscal::model::formula::VARIABLES;
 use axiscal::model::predict::{Model, Observation, SetUp};
+use axiscal::model::surface::{Body, Surface};
 use common::machine;
 use nalgebra::Vector3;
 
@@ -21,7 +22,7 @@ fn gap(
     normal: Vector3<f64>,
 ) -> (f64, f64) {
     let catalogue = Catalogue::built_in().unwrap();
-    let set_up = SetUp { label: "block".into(), carrier, centre: Vector3::zeros(), runs: vec![0] };
+    let set_up = SetUp { label: "block".into(), carrier, body: Body::Box, centre: Vector3::zeros(), runs: vec![0] };
     let model = Model::new(machine, &[catalogue.get(effect, machine).unwrap()], &[set_up], machine.reference.pivot);
     let theta: Vec<f64> = model
         .unknowns
@@ -37,6 +38,7 @@ fn gap(
         set_up: 0,
         point,
         normal,
+        surface: Surface::Plane { point, normal },
         ball_radius: 0.0,
         ball_at_zero: machine.tool.ball_at_zero(machine.tool.length_mm),
         position,

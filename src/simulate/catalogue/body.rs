@@ -11,7 +11,8 @@ use crate::simulate::terms::{Shape, Target};
 pub fn ids(_: &Machine) -> Vec<String> {
     let weight = ["head-sag", "head-tilt", "table-sag", "table-load"];
     let artefact = ["block-size", "block-own-size", "block-shape", "block-slip", "block-temperature"];
-    weight.into_iter().chain(artefact).map(str::to_owned).collect()
+    let round = ["artefact-diameter", "sphere-form-2", "sphere-form-3", "stem-bending", "stem-sag"];
+    weight.into_iter().chain(artefact).chain(round).map(str::to_owned).collect()
 }
 
 /// Parameters of an id of this family.
@@ -34,6 +35,19 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
         "table-load" => table_load(machine),
         "block-size" => Ok((0..3).map(size).collect()),
         "block-own-size" => Ok((0..3).map(own_size).collect()),
+        "artefact-diameter" => Ok(vec![Parameter::new("diameter", Um, [(Target::Radius, Shape::Constant, 0.5)])]),
+        "sphere-form-2" => Ok(form_error(2)),
+        "sphere-form-3" => Ok(form_error(3)),
+        // the ball pushes the sphere away: its stem bends sideways and gives way along itself less than can be seen
+        "stem-bending" => {
+            let acts = [0, 1].map(|i| (Target::Block(i), Shape::Push(i), 1.0));
+            Ok(vec![Parameter::new("stem_bending", Um, acts).alias("k")])
+        }
+        // and hangs down where the table stands upright
+        "stem-sag" => {
+            let acts = [0, 1].map(|i| (Target::Block(i), Shape::CarrierGravity(i), 1.0));
+            Ok(vec![Parameter::new("stem_sag", Um, acts).alias("sag")])
+        }
         "block-shape" => {
             let acts = [(Target::HalfSize(0), Shape::Constant, 0.5), (Target::HalfSize(1), Shape::Constant, -0.5)];
             Ok(vec![Parameter::new("dXY", Um, acts)])
@@ -45,6 +59,12 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
         }
         _ => Err(Refusal::Unknown),
     }
+}
+
+/// A sphere with two or three lobes about its upright axis.
+fn form_error(k: i32) -> Vec<Parameter> {
+    let row = |letter, shape| Parameter::at(format!("form{k}{letter}"), Um, Target::Radius, shape);
+    vec![row('c', Shape::FormCosine(k)), row('s', Shape::FormSine(k))]
 }
 
 /// The axis of the head that tilts the tool: B where the head has it, else A.

@@ -34,8 +34,10 @@ pub fn empty_plan(machine: &Machine, mounting: &str) -> Plan {
         name: b.name.clone(),
         carrier: m.carrier.to_string(),
         mounting: None,
+        form: b.form,
         centre: b.centre.into(),
         size: b.size.into(),
+        diameter: b.diameter,
     });
     Plan {
         format: FORMAT.to_owned(),

@@ -188,8 +188,10 @@ pub fn program(
             name: b.name.clone(),
             carrier: carrier.clone(),
             mounting: None,
+            form: b.form,
             centre: centre.into(),
             size: b.size.into(),
+            diameter: b.diameter,
         });
     }
     let mut touches = Vec::new();
