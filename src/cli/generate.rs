@@ -6,13 +6,16 @@ use crate::axes::AxisMap;
 use crate::diag::{Failure, Finding, Result, source};
 use crate::files;
 use crate::machine::Machine;
+use crate::machine::artefact::{self, WithArtefact};
+use crate::model::catalogue::Catalogue;
 use crate::post::Postprocessor;
 use crate::program::path::{Step, Stop};
 use crate::program::plan::{Plan, Proof};
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
 use crate::report::fit::{number, table};
+use crate::workflow::auto_program::{AutoProgram, auto_program};
 use crate::workflow::generate::{ForControl, generate, load_program};
-use crate::workflow::{Environment, load_controller};
+use crate::workflow::{Environment, load_controller, machines_file};
 use comfy_table::Cell;
 use serde_json::json;
 use std::collections::BTreeMap;
@@ -22,9 +25,18 @@ use std::path::{Path, PathBuf};
 pub struct Args {
     #[command(flatten)]
     machine: MachineArgs,
-    /// Name of a program (`axiscal programs` lists them), or a file of your own: FILE.toml
+    /// Name of a program (`axiscal programs` lists them), a file of your own (FILE.toml), or `auto`: poses and touches are chosen
     #[arg(long, short)]
     program: String,
+    /// What is mounted: a built-in artefact (`axiscal artefacts` lists them), or a file of your own: FILE.toml
+    #[arg(long, value_name = "NAME|FILE")]
+    artefact: Option<String>,
+    /// With `--program auto`: one of the machine's own mountings, instead of --artefact
+    #[arg(long, value_name = "NAME", conflicts_with = "artefact")]
+    mounting: Option<String>,
+    /// With `--program auto`: how long the program may take
+    #[arg(long, value_name = "N", default_value_t = 20.0)]
+    minutes: f64,
     /// Name of the controller (`axiscal controllers` lists them)
     #[arg(long, short, required_unless_present = "postprocessor")]
     controller: Option<String>,
@@ -60,8 +72,16 @@ enum TouchWith {
 /// # Errors
 /// When machine, program or controller are unusable, or nothing can be reached; nothing is written then.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
-    let machine = args.machine.load(io)?;
-    let spec = load_program(&args.program, &machine, io)?;
+    let mut machine = args.machine.load(io)?;
+    let mounted = args.artefact.as_deref().map(|word| mount_artefact(word, &machine, args, io)).transpose()?;
+    if let Some(mounted) = &mounted {
+        machine = mounted.machine.clone();
+    }
+    let auto = (args.program == AUTO).then(|| choose_touches(&machine, mounted.as_ref(), args)).transpose()?;
+    let spec = match &auto {
+        Some(auto) => auto.spec.clone(),
+        None => load_program(&args.program, &machine, io)?,
+    };
     let word = match (&args.postprocessor, &args.controller) {
         // a path without a folder or an ending would read as the name of a controller
         (Some(file), _) => Path::new(".").join(file).display().to_string(),
@@ -80,8 +100,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let options = Options { strict: args.strict, tcp: args.tcp };
     let ForControl { mut generated, nc, proof, seconds } = generate(&machine, &spec, &post, &options, &Summarised(io))?;
 
-    let files: Vec<(PathBuf, &str)> =
+    let mut files: Vec<(PathBuf, &str)> =
         nc.files(&spec.name).into_iter().map(|(name, text)| (args.out.join(name), text)).collect();
+    files.extend(auto.as_ref().map(|auto| (args.out.join(format!("{AUTO}.toml")), auto.text.as_str())));
+    files.extend(mounted.as_ref().map(|m| (args.out.join(MACHINES), m.text.as_str())));
     // the same touches for another control: what was proven of its program stays known
     if let Some(old) = old_programs(&plan_file, &generated.plan) {
         generated.plan.programs = old;
@@ -98,10 +120,49 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         io.say(format!("{} goes to the control with the program: {}", file.display(), beside.says));
     }
     io.say("the head of the program says what to set up where");
+    if auto.is_some() {
+        io.say(format!("{AUTO}.toml holds the chosen touches: it can be edited and used with --program FILE"));
+    }
+    if mounted.is_some() {
+        let file = super::next::quoted(&args.out.join(MACHINES));
+        io.say(format!("the machine with its artefact: add --machines {file} to further calls"));
+    }
     if post.dry_run_mm > 0.0 {
         io.say("it is written for a dry run: it measures nothing until its height in the head is 0");
     }
     Ok(Answer::Done)
+}
+
+/// The word for a program that is chosen.
+const AUTO: &str = "auto";
+
+/// The machine with its artefact, beside the program.
+const MACHINES: &str = "machines.toml";
+
+/// Mounts an artefact on the machine.
+fn mount_artefact(word: &str, machine: &Machine, args: &Args, io: &Io) -> Result<WithArtefact> {
+    let artefact =
+        if word.ends_with(".toml") { io.source(Path::new(word))? } else { super::artefacts::built_in(word)? };
+    let machines = machines_file(args.machine.machines.as_deref(), io)?;
+    let (mounted, findings) = artefact::mount(&machines, machine, &artefact)?;
+    io.report(&findings.0);
+    Ok(mounted)
+}
+
+/// Chooses poses and touches for what is mounted.
+fn choose_touches(machine: &Machine, mounted: Option<&WithArtefact>, args: &Args) -> Result<AutoProgram> {
+    let name = mounted.map(|m| m.mounting.as_str()).or(args.mounting.as_deref());
+    let has = || machine.mountings.iter().map(|m| m.name.as_str()).collect::<Vec<_>>().join(", ");
+    let mounting = match name {
+        Some(name) => machine.mounting(name),
+        None => machine.mountings.first(),
+    };
+    let Some(mounting) = mounting else {
+        let says = format!("{} has no mounting {:?}", machine.name, name.unwrap_or_default());
+        return Err(Failure::new("program::unknown_mounting", says)
+            .help(format!("name an artefact (--artefact sphere), or one of its mountings: {}", has())));
+    };
+    auto_program(machine, &Catalogue::built_in()?, mounting, args.minutes)
 }
 
 /// A height at which the ball is over the blocks and not beyond every machine.

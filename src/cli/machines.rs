@@ -2,10 +2,11 @@
 
 use super::{Answer, Io};
 use crate::diag::Result;
+use crate::machine::artefact::one_machine;
 use crate::machine::{Axis, Carrier, Machine, Side};
 use crate::report::fit::{number, table};
 use crate::units::um_from_mm;
-use crate::workflow::{load_machine, load_machines};
+use crate::workflow::{load_machine, load_machines, machines_file};
 use comfy_table::Cell;
 use serde_json::json;
 use std::path::PathBuf;
@@ -27,6 +28,9 @@ pub enum MachinesCommand {
     Show {
         /// Its name
         name: String,
+        /// As a file: to save, change and use with --machines FILE
+        #[arg(long)]
+        toml: bool,
     },
 }
 
@@ -34,7 +38,16 @@ pub enum MachinesCommand {
 /// When the file is unusable or there is no such machine.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     match &args.what {
-        Some(MachinesCommand::Show { name }) => show(&load_machine(name, args.machines.as_deref(), io)?, io),
+        Some(MachinesCommand::Show { name, toml: false }) => {
+            show(&load_machine(name, args.machines.as_deref(), io)?, io);
+        }
+        Some(MachinesCommand::Show { name, toml: true }) => {
+            // a machine that cannot be used is no template
+            load_machine(name, args.machines.as_deref(), io)?;
+            let text = one_machine(&machines_file(args.machines.as_deref(), io)?, name)?;
+            io.say(text.trim_end());
+            io.answer(&json!({ "name": name, "text": text }));
+        }
         None => {
             let machines = load_machines(args.machines.as_deref(), io)?;
             let mut t = table(&["machine", "workpiece side", "tool side", "what it is"]);

@@ -4,6 +4,7 @@
 //! "no", 2 the input or the call was unusable.
 
 mod add;
+mod artefacts;
 mod assess;
 mod check;
 mod common;
@@ -59,6 +60,8 @@ enum Verb {
     Machines(machines::Args),
     /// List the effects that are built in or found, or show one
     Effects(effects::Args),
+    /// List the artefacts that are built in, or show one
+    Artefacts(artefacts::Args),
     /// List the controllers that are built in or found, or show one
     Controllers(controllers::Args),
     /// List the probing programs that are built in or found, or show one
@@ -141,6 +144,7 @@ fn dispatch(verb: Verb, io: &Io) -> crate::diag::Result<Answer> {
         Verb::Demo(args) => demo::run(&args, io),
         Verb::Machines(args) => machines::run(&args, io),
         Verb::Effects(args) => effects::run(&args, io),
+        Verb::Artefacts(args) => artefacts::run(&args, io),
         Verb::Controllers(args) => controllers::run(&args, io),
         Verb::Programs(args) => programs::run(&args, io),
         Verb::Assess(args) => assess::run(&args, io),

@@ -17,6 +17,8 @@ pub enum SchemaOf {
     Machines,
     /// A program of your own
     Programs,
+    /// An artefact of your own
+    Artefacts,
     /// A postprocessor
     Postprocessors,
     /// study.toml
@@ -31,6 +33,7 @@ pub fn run(args: &Args, _io: &Io) -> Result<Answer> {
     let schema = match args.what {
         SchemaOf::Machines => schemars::schema_for!(crate::machine::as_written::File),
         SchemaOf::Programs => crate::program::schema(),
+        SchemaOf::Artefacts => crate::machine::artefact::schema(),
         SchemaOf::Postprocessors => schemars::schema_for!(crate::post::as_written::File),
         SchemaOf::Study => schemars::schema_for!(crate::study::AsWritten),
         SchemaOf::Effects => schemars::schema_for!(crate::model::as_written::File),

@@ -3,9 +3,11 @@
 use super::linearised_plan::{INDEX_S, STYLUS_S, TOUCH_S};
 use super::vary::faces_the_spindle;
 use crate::axes::{AxisMap, AxisName, Position};
-use crate::machine::{Block, Machine, Mounting};
+use crate::machine::{Block, Form, Machine, Mounting};
+use crate::program::as_written::RingIn;
 use crate::program::plan::{self, ControllerFrame, Plan, PlanBlock, PlanTouch};
-use crate::program::spec::{FORMAT, Face};
+use crate::program::ring_points;
+use crate::program::spec::{Along, FORMAT, Face};
 use crate::units::Plain;
 use nalgebra::Vector3;
 use std::collections::BTreeSet;
@@ -41,6 +43,15 @@ pub struct Manner {
     pub stylus: Option<String>,
 }
 
+/// A point on what is round.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RingTouch {
+    /// As the plan calls it.
+    pub label: String,
+    pub azimuth_deg: f64,
+    pub along: Along,
+}
+
 /// One block in one pose.
 #[derive(Debug, Clone)]
 pub struct Bundle {
@@ -48,7 +59,10 @@ pub struct Bundle {
     pub manner: Manner,
     /// The block's name.
     pub block: String,
+    /// Its flat faces that are touched.
     pub faces: Vec<String>,
+    /// Where it is touched on what is round.
+    pub ring: Vec<RingTouch>,
     /// The touches, with axis positions.
     pub touches: Vec<PlanTouch>,
 }
@@ -109,28 +123,80 @@ fn manners(machine: &Machine) -> Vec<Manner> {
     out
 }
 
+/// Azimuths of a ring, deg: five take neither a second nor a third lobe of probe or sphere for a place.
+const AZIMUTHS_DEG: [f64; 5] = [0.0, 72.0, 144.0, 216.0, 288.0];
+
+/// Height of a ring over the equator of a sphere, deg: above what its stem and the placement tolerance hide.
+const ELEVATION_DEG: f64 = 15.0;
+
+/// Rings on a cylinder and in a bore, in parts of its height from the upper end.
+const DEPTHS: [f64; 2] = [0.3, 0.7];
+
+/// The directions in which a sphere is touched count in the spindle's frame.
+pub const SPHERE_IN: RingIn = RingIn::Tool;
+
 fn bundle(machine: &Machine, manner: &Manner, block: &Block) -> Bundle {
     let at = manner.pose.position();
-    let (mut faces, mut touches) = (Vec::new(), Vec::new());
-    for word in ["+Z", "+X", "-X", "+Y", "-Y"] {
+    let mut bundle = Bundle {
+        manner: manner.clone(),
+        block: block.name.clone(),
+        faces: Vec::new(),
+        ring: Vec::new(),
+        touches: Vec::new(),
+    };
+    let flat: &[&str] = match block.form {
+        Form::Box => &["+Z", "+X", "-X", "+Y", "-Y"],
+        Form::Plane | Form::Cylinder => &["+Z"],
+        _ => &[],
+    };
+    for word in flat {
         let Some(face) = Face::parse(word) else { continue };
-        if !faces_the_spindle(machine, block.carrier, &at, &face.normal()) {
+        let normal = face.normal();
+        if !faces_the_spindle(machine, block.carrier, &at, &normal) {
             continue;
         }
         let all: Option<Vec<PlanTouch>> =
-            points(face, block).into_iter().map(|p| touch(machine, manner, block, face, &p, &at)).collect();
+            points(face, block).into_iter().map(|p| touch(machine, manner, block, word, (&p, &normal), &at)).collect();
         if let Some(all) = all {
-            faces.push(word.to_owned());
-            touches.extend(all);
+            bundle.faces.push((*word).to_owned());
+            bundle.touches.extend(all);
         }
     }
-    Bundle { manner: manner.clone(), block: block.name.clone(), faces, touches }
+    let turned = ring_points::to_carrier(machine, block, SPHERE_IN, &at);
+    for (azimuth_deg, along) in ring(block) {
+        let Ok(p) = ring_points::place(block, azimuth_deg, along, &turned) else { continue };
+        if !faces_the_spindle(machine, block.carrier, &at, &p.normal) {
+            continue;
+        }
+        if let Some(t) = touch(machine, manner, block, &p.label, (&p.point, &p.normal), &at) {
+            bundle.ring.push(RingTouch { label: p.label, azimuth_deg, along });
+            bundle.touches.push(t);
+        }
+    }
+    bundle
+}
+
+/// Where a body that is round is touched: the pole first, which finds it.
+fn ring(block: &Block) -> Vec<(f64, Along)> {
+    let around = |along: Along| AZIMUTHS_DEG.into_iter().map(move |azimuth| (azimuth, along));
+    match block.form {
+        Form::Sphere => {
+            std::iter::once((0.0, Along::Elevation(90.0))).chain(around(Along::Elevation(ELEVATION_DEG))).collect()
+        }
+        Form::Cylinder | Form::Bore => {
+            // a tenth of a millimetre is fine enough to be read
+            DEPTHS.iter().flat_map(|d| around(Along::Depth((d * block.size.z * 10.0).round() / 10.0))).collect()
+        }
+        Form::Box | Form::Plane => Vec::new(),
+    }
 }
 
 /// Four points of the upper face, two of a side.
 fn points(face: Face, block: &Block) -> Vec<Vector3<f64>> {
     let (n, (u, v)) = (face.normal(), face.tangents());
-    let edge = |d: &Vector3<f64>| block.size.dot(&d.abs());
+    // the end of a cylinder is no square: points within it
+    let within = if block.form == Form::Cylinder { std::f64::consts::FRAC_1_SQRT_2 } else { 1.0 };
+    let edge = |d: &Vector3<f64>| block.size.dot(&d.abs()) * if d.z == 0.0 { within } else { 1.0 };
     let centre = block.centre + n * (edge(&n) / 2.0);
     let across: Vec<f64> =
         if face.axis == 2 { vec![-SHARE * edge(&v), SHARE * edge(&v)] } else { vec![edge(&v) / 2.0 - DEPTH_MM] };
@@ -144,13 +210,13 @@ fn touch(
     machine: &Machine,
     manner: &Manner,
     block: &Block,
-    face: Face,
-    point: &Vector3<f64>,
+    face: &str,
+    (point, normal): (&Vector3<f64>, &Vector3<f64>),
     at: &Position,
 ) -> Option<PlanTouch> {
     let (probe, length_mm) = (&machine.probe, machine.tool.length_mm);
     let place = |off_face: f64| -> Option<AxisMap> {
-        let ball = point + face.normal() * (probe.ball_radius + off_face);
+        let ball = point + normal * (probe.ball_radius + off_face);
         let at = machine.linear_for_ball(block.carrier, at, &ball, length_mm)?;
         let inside = |name: AxisName| {
             machine.axis(name).is_none_or(|axis| {
@@ -168,9 +234,9 @@ fn touch(
         carrier: block.carrier.to_string(),
         mounting: None,
         block: block.name.as_str().into(),
-        face: face.to_string(),
+        face: face.to_owned(),
         point: (*point).into(),
-        normal: face.normal().into(),
+        normal: (*normal).into(),
         pose: manner.pose,
         start: place(probe.approach)?,
         nominal: place(0.0)?,
@@ -250,20 +316,78 @@ pub fn cost_s(pool: &[Bundle], chosen: &[usize]) -> f64 {
 /// The program file of a choice: a stage for each stylus, the probe's own first; poses next to each other follow one
 /// another.
 #[must_use]
-pub fn program_text(
-    machine: &Machine,
-    mounting: &Mounting,
-    name: &str,
-    says: &str,
-    pool: &[Bundle],
-    chosen: &[usize],
-) -> String {
+pub fn program_text(machine: &Machine, mounting: &Mounting, head: &Head, pool: &[Bundle], chosen: &[usize]) -> String {
+    let Head { by, name, says, again } = head;
     let mut text = format!(
-        "# chosen by `axiscal plan-next`\nformat = \"{FORMAT}\"\nname = \"{name}\"\nmachine = \"{}\"\nsays = {}\nmounting = \"{}\"\nfaces_in = \"block\"\n",
+        "# chosen by `axiscal {by}`\nformat = \"{FORMAT}\"\nname = \"{name}\"\nmachine = \"{}\"\nsays = {}\nmounting = \"{}\"\nfaces_in = \"block\"\n",
         machine.name,
-        toml_edit::value(says),
+        toml_edit::value(*says),
         mounting.name
     );
+    let mut shapes = Shapes::default();
+    let mut body = String::new();
+    let order = in_order(machine, pool, chosen);
+    let mut stage: Option<Option<String>> = None;
+    for (at, &i) in order.iter().enumerate() {
+        let manner = &pool[i].manner;
+        if stage.as_ref() != Some(&manner.stylus) {
+            let word = stage_of(manner);
+            let _ = write!(body, "\n[[stage]]\nname = \"{word}\"\nstylus = \"{word}\"\n");
+            stage = Some(manner.stylus.clone());
+        }
+        let alike = |&&k: &&usize| touched_alike(mounting, &pool[k], &pool[i]);
+        if order[..at].iter().any(|k| alike(&k)) {
+            continue;
+        }
+        let together: Vec<&str> = order.iter().filter(alike).map(|&k| pool[k].block.as_str()).collect();
+        body.push_str(&setup_text(mounting, &pool[i], &together, &mut shapes));
+    }
+    if !again.is_empty() {
+        let _ =
+            write!(body, "\n# the first poses once more: how well the machine repeats\n[[stage]]\nname = \"again\"\n");
+        for &i in *again {
+            body.push_str(&setup_text(mounting, &pool[i], &[&pool[i].block], &mut shapes));
+        }
+    }
+    for (grid, n) in shapes.grids.iter().zip(1..) {
+        let _ = write!(text, "\n[[grid]]\nname = \"G{n}\"\n{grid}\n");
+    }
+    for (ring, n) in shapes.rings.iter().zip(1..) {
+        let _ = write!(text, "\n[[ring]]\nname = \"R{n}\"\n{ring}\n");
+    }
+    text + &body
+}
+
+/// What a program says of itself.
+#[derive(Debug, Clone, Copy)]
+pub struct Head<'a> {
+    /// The verb that chose it.
+    pub by: &'a str,
+    pub name: &'a str,
+    /// What it is for, in one line.
+    pub says: &'a str,
+    /// Bundles that are touched once more at the end.
+    pub again: &'a [usize],
+}
+
+/// Grids and rings of a program, each once.
+#[derive(Default)]
+struct Shapes {
+    grids: Vec<String>,
+    rings: Vec<String>,
+}
+
+/// Number of a text in a list, from 1; it is added where it is missing.
+fn number_in(list: &mut Vec<String>, text: String) -> usize {
+    let at = list.iter().position(|t| *t == text).unwrap_or_else(|| {
+        list.push(text);
+        list.len() - 1
+    });
+    at + 1
+}
+
+/// Bundles by stylus, then by pose.
+fn in_order(machine: &Machine, pool: &[Bundle], chosen: &[usize]) -> Vec<usize> {
     let mut order: Vec<usize> = chosen.to_vec();
     let angle = |i: usize, name: AxisName| pool[i].manner.pose.get(name).unwrap_or(0.0);
     order.sort_by(|&a, &b| {
@@ -273,72 +397,65 @@ pub fn program_text(
         let by_pose = pa.iter().zip(&pb).map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne());
         sa.cmp(&sb).then(by_pose.unwrap_or(std::cmp::Ordering::Equal)).then(a.cmp(&b))
     });
-    let mut grids: Vec<String> = Vec::new();
-    let mut body = String::new();
-    let mut stage: Option<Option<String>> = None;
-    let mut done: Vec<usize> = Vec::new();
-    for &i in &order {
-        if done.contains(&i) {
+    order
+}
+
+/// Blocks in the same manner with the same points share a set-up.
+fn touched_alike(mounting: &Mounting, a: &Bundle, b: &Bundle) -> bool {
+    a.manner == b.manner && a.faces == b.faces && a.ring == b.ring && same_size(mounting, &a.block, &b.block)
+}
+
+fn setup_text(mounting: &Mounting, bundle: &Bundle, blocks: &[&str], shapes: &mut Shapes) -> String {
+    let manner = &bundle.manner;
+    let pose: Vec<String> = manner.pose.iter().map(|(a, x)| format!("{a} = {}", decimal(x))).collect();
+    let from: Vec<String> = manner.from.iter().map(|(a, x)| format!("{a} = {x:.0}")).collect();
+    let blocks: Vec<String> = blocks.iter().map(|b| format!("\"{b}\"")).collect();
+    let block = mounting.blocks.iter().find(|b| b.name == bundle.block);
+    let mut groups = Vec::new();
+    for side in [false, true] {
+        let faces: Vec<String> =
+            bundle.faces.iter().filter(|f| f.ends_with('Z') != side).map(|f| format!("\"{f}\"")).collect();
+        if faces.is_empty() {
             continue;
         }
-        let manner = &pool[i].manner;
-        if stage.as_ref() != Some(&manner.stylus) {
-            let word = stage_of(manner);
-            let _ = write!(body, "\n[[stage]]\nname = \"{word}\"\nstylus = \"{word}\"\n");
-            stage = Some(manner.stylus.clone());
-        }
-        // blocks in the same manner with the same faces share a set-up
-        let together: Vec<usize> = order
-            .iter()
-            .copied()
-            .filter(|&k| {
-                pool[k].manner == *manner
-                    && pool[k].faces == pool[i].faces
-                    && same_size(mounting, &pool[k].block, &pool[i].block)
-            })
-            .collect();
-        let pose: Vec<String> = manner.pose.iter().map(|(a, x)| format!("{a} = {}", decimal(x))).collect();
-        let from: Vec<String> = manner.from.iter().map(|(a, x)| format!("{a} = {x:.0}")).collect();
-        let blocks: Vec<String> = together.iter().map(|&k| format!("\"{}\"", pool[k].block)).collect();
-        let grid = |side: bool, grids: &mut Vec<String>| -> String {
-            let size = mounting.blocks.iter().find(|b| b.name == pool[i].block).map_or_else(Vector3::zeros, |b| b.size);
-            let [x, y] = [size.x, size.y].map(|e| Plain((e * SHARE * 1e6).round() / 1e6).to_string());
-            let spelled = if side {
-                format!("u = [-{x}, {x}]\ndepth = [{DEPTH_MM}]")
-            } else {
-                format!("u = [-{x}, {x}]\nv = [-{y}, {y}]")
-            };
-            let n = grids.iter().position(|g| *g == spelled).unwrap_or_else(|| {
-                grids.push(spelled);
-                grids.len() - 1
-            });
-            format!("G{}", n + 1)
+        let round = block.is_some_and(|b| b.form.is_round());
+        let share = if round { SHARE * std::f64::consts::FRAC_1_SQRT_2 } else { SHARE };
+        let size = block.map_or_else(Vector3::zeros, |b| b.size);
+        let [x, y] = [size.x, size.y].map(|e| Plain((e * share * 1e6).round() / 1e6).to_string());
+        let spelled = if side {
+            format!("u = [-{x}, {x}]\ndepth = [{DEPTH_MM}]")
+        } else {
+            format!("u = [-{x}, {x}]\nv = [-{y}, {y}]")
         };
-        let quoted = |side: bool| -> Vec<String> {
-            pool[i].faces.iter().filter(|f| f.ends_with('Z') != side).map(|f| format!("\"{f}\"")).collect()
+        let n = number_in(&mut shapes.grids, spelled);
+        groups.push(format!("{{ faces = [{}], grid = \"G{n}\" }}", faces.join(", ")));
+    }
+    let mut rest = &bundle.ring[..];
+    while let Some(first) = rest.first() {
+        let count = rest.iter().take_while(|r| r.along == first.along).count();
+        let (one, others) = rest.split_at(count);
+        rest = others;
+        let azimuths: Vec<String> = one.iter().map(|r| decimal(r.azimuth_deg)).collect();
+        let spelled = match first.along {
+            Along::Elevation(deg) => format!(
+                "directions_in = \"tool\"\nazimuth_deg = [{}]\nelevation_deg = [{}]",
+                azimuths.join(", "),
+                decimal(deg)
+            ),
+            Along::Depth(mm) => format!("azimuth_deg = [{}]\ndepth = [{}]", azimuths.join(", "), decimal(mm)),
         };
-        let groups: Vec<String> = [false, true]
-            .into_iter()
-            .map(|side| (quoted(side), side))
-            .filter(|(faces, _)| !faces.is_empty())
-            .map(|(faces, side)| format!("{{ faces = [{}], grid = \"{}\" }}", faces.join(", "), grid(side, &mut grids)))
-            .collect();
-        let _ = write!(
-            body,
-            "\n[[stage.setup]]\npose = {{ {} }}\nfrom = {{ {} }}\nspindle_deg = {}\nfeed = {}\nblocks = [{}]\ntouch = [{}]\n",
-            pose.join(", "),
-            from.join(", "),
-            decimal(manner.spindle_deg),
-            decimal(manner.feed_mm_min),
-            blocks.join(", "),
-            groups.join(", ")
-        );
-        done.extend(together);
+        let n = number_in(&mut shapes.rings, spelled);
+        groups.push(format!("{{ ring = \"R{n}\" }}"));
     }
-    for (grid, n) in grids.iter().zip(1..) {
-        let _ = write!(text, "\n[[grid]]\nname = \"G{n}\"\n{grid}\n");
-    }
-    text + &body
+    format!(
+        "\n[[stage.setup]]\npose = {{ {} }}\nfrom = {{ {} }}\nspindle_deg = {}\nfeed = {}\nblocks = [{}]\ntouch = [{}]\n",
+        pose.join(", "),
+        from.join(", "),
+        decimal(manner.spindle_deg),
+        decimal(manner.feed_mm_min),
+        blocks.join(", "),
+        groups.join(", ")
+    )
 }
 
 /// Stages are called after their stylus.
@@ -368,7 +485,8 @@ pub fn without(pool: &[Bundle], skipped: &[plan::Skipped]) -> Vec<Bundle> {
         .filter_map(|b| {
             let mut left = b.clone();
             left.faces.retain(|f| !is_out(b, f));
-            left.touches.retain(|t| left.faces.contains(&t.face));
+            left.ring.retain(|r| !is_out(b, &r.label));
+            left.touches.retain(|t| left.faces.contains(&t.face) || left.ring.iter().any(|r| r.label == t.face));
             (left.touches.len() >= 3).then_some(left)
         })
         .collect()

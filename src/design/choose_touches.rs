@@ -78,23 +78,27 @@ impl Separation {
     }
 }
 
+/// Whitened columns in typical sizes: the model's free unknowns, whose number stands beside them, then the effects that it leaves out.
+#[must_use]
+pub fn typical_columns(view: &LinearisedPlan) -> (DMatrix<f64>, usize) {
+    let n_base = view.free.len();
+    let mut columns = view.jacobian.clone();
+    for (mut column, &i) in columns.column_iter_mut().zip(&view.free) {
+        column *= view.model.unknowns[i].typical;
+    }
+    let own = view.library.matrix();
+    let mut all = columns.resize_horizontally(n_base + own.ncols(), 0.0);
+    all.columns_mut(n_base, own.ncols()).copy_from(&own);
+    (all, n_base)
+}
+
 impl Design {
     /// `view`: all touches so far and then those of the pool, with the columns of the effects in question.
     /// `n_given`: how many touches there are already.
     #[must_use]
     pub fn new(view: &LinearisedPlan, n_given: usize, pool: &[Bundle], questions: &Questions) -> Self {
-        let n_base = view.free.len();
+        let (columns, n_base) = typical_columns(view);
         let mut spans = Vec::new();
-        let mut columns = view.jacobian.clone();
-        for (mut column, &i) in columns.column_iter_mut().zip(&view.free) {
-            column *= view.model.unknowns[i].typical;
-        }
-        let own = view.library.matrix();
-        let columns = {
-            let mut all = columns.resize_horizontally(n_base + own.ncols(), 0.0);
-            all.columns_mut(n_base, own.ncols()).copy_from(&own);
-            all
-        };
         for c in view.library.candidates() {
             let span = &c.variants[0].columns;
             spans.push((c.id.clone(), n_base + span.start..n_base + span.end));

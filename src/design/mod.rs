@@ -5,6 +5,7 @@
 //! that part what a fit cannot tell apart. All verdicts are computed from the varied touches, none is looked up.
 
 mod assess;
+pub mod auto_plan;
 pub mod bundle;
 pub mod choose_touches;
 mod explain;

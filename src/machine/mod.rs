@@ -4,6 +4,7 @@
 //! direction or a radius of zero; everything after it relies on that. Nothing here knows errors, programs or
 //! controllers.
 
+pub mod artefact;
 pub mod as_written;
 mod check;
 mod check_parts;

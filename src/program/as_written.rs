@@ -60,6 +60,18 @@ pub enum FacesIn {
     Machine,
 }
 
+/// What the directions of a ring count in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum RingIn {
+    /// The body at all axes 0: they turn with what carries it.
+    Block,
+    /// The machine, whatever the pose.
+    Machine,
+    /// The spindle at the pose: elevation 90 is where it comes from.
+    Tool,
+}
+
 /// How the blocks of a stage came to stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
@@ -101,6 +113,8 @@ pub struct Ring {
     /// Short name.
     #[schemars(with = "String")]
     pub name: Spanned<String>,
+    /// Spheres: what the directions count in; without it what `faces_in` says.
+    pub directions_in: Option<RingIn>,
     /// Directions from the middle, deg.
     pub azimuth_deg: Vec<f64>,
     /// Spheres: height over the equator, deg; 90 is the pole.

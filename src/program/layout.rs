@@ -1,7 +1,7 @@
 //! A program on a machine: which points are to be touched in which pose, in order. Whether they can be reached is not
 //! asked here.
 
-use super::as_written::FacesIn;
+use super::as_written::{FacesIn, RingIn};
 use super::parts::Part;
 use super::ring_points;
 use super::spec::{Across, At, Face, FaceGrid, MOST_TOUCHES, ProgramSpec, RingPoints, SetupSpec};
@@ -170,15 +170,14 @@ impl<'a> Check<'a> {
             }
         }
         let blocks = self.blocks(mounting, spec);
-        let to_carrier = |block: &Block| match self.spec.faces_in {
-            FacesIn::Block => Rotation3::identity(),
-            FacesIn::Machine => {
-                machine.carrier_frame(block.carrier, &pose.position()).rotation.inverse().to_rotation_matrix()
-            }
+        let named_in = match self.spec.faces_in {
+            FacesIn::Block => RingIn::Block,
+            FacesIn::Machine => RingIn::Machine,
         };
+        let at = pose.position();
         let mut targets = Vec::new();
         for (b, block) in blocks.iter().filter_map(|&b| Some((b, mounting.blocks.get(b)?))) {
-            let turned = to_carrier(block);
+            let turned = ring_points::to_carrier(machine, block, named_in, &at);
             let before = targets.len();
             if matches!(block.form, Form::Box | Form::Plane | Form::Cylinder) {
                 for faces in &spec.faces {
@@ -187,6 +186,7 @@ impl<'a> Check<'a> {
             }
             if block.form.is_round() {
                 for ring in &spec.rings {
+                    let turned = ring_points::to_carrier(machine, block, ring.directions_in, &at);
                     targets.extend(self.ring(b, block, ring, &turned));
                 }
             }

@@ -1,9 +1,11 @@
 //! Points on spheres, on cylinders and in bores: from a ring of directions to places and normals in the carrier's frame.
 
+use super::as_written::RingIn;
 use super::spec::Along;
-use crate::machine::{Block, Form};
+use crate::axes::Position;
+use crate::machine::{Block, Form, Machine};
 use crate::units::{deg_from_rad, rad_from_deg};
-use nalgebra::{Rotation3, Vector3};
+use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
 /// A point on what is round, in the carrier's frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,6 +16,22 @@ pub struct RingPoint {
     pub normal: Vector3<f64>,
     /// Azimuth and elevation in the carrier's frame, e.g. `az72 el10`.
     pub label: String,
+}
+
+/// What turns the directions of a frame into those of a body's carrier, in a pose.
+#[must_use]
+pub fn to_carrier(machine: &Machine, block: &Block, frame: RingIn, pose: &Position) -> Rotation3<f64> {
+    let into_carrier = || machine.carrier_frame(block.carrier, pose).rotation.inverse();
+    match frame {
+        RingIn::Block => Rotation3::identity(),
+        RingIn::Machine => into_carrier().to_rotation_matrix(),
+        RingIn::Tool => {
+            // Z is where the spindle is
+            let up = UnitQuaternion::rotation_between(&Vector3::z(), &machine.tool.direction);
+            let turned = machine.tool_frame(pose).rotation * up.unwrap_or_default();
+            (into_carrier() * turned).to_rotation_matrix()
+        }
+    }
 }
 
 /// Places a point of a ring on a body; `to_carrier` turns the directions of the program's frame into the carrier's.

@@ -2,7 +2,7 @@
 //!
 //! What only a machine can tell (does the mounting have this block, does the axis go there) is checked by `layout`.
 
-use super::as_written::{self as w, FacesIn};
+use super::as_written::{self as w, FacesIn, RingIn};
 use super::parts::{PartSpec, part_of};
 use crate::axes::{AxisMap, AxisName};
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
@@ -126,6 +126,8 @@ pub enum Along {
 #[derive(Debug, Clone)]
 pub struct RingPoints {
     pub name: At<String>,
+    /// What directions on a sphere count in.
+    pub directions_in: RingIn,
     /// Azimuth, deg, and the second coordinate.
     pub points: Vec<(f64, Along)>,
 }
@@ -200,8 +202,11 @@ pub fn load(source: &Source) -> Result<(ProgramSpec, Findings)> {
 /// What a program names once and uses by name.
 struct Named {
     grids: Vec<(String, Vec<GridPoint>, bool)>,
-    rings: Vec<(String, Vec<(f64, Along)>)>,
+    rings: Vec<NamedRing>,
 }
+
+/// A ring as the file has it: name, frame, points.
+type NamedRing = (String, RingIn, Vec<(f64, Along)>);
 
 struct Check<'a> {
     source: &'a Source,
@@ -240,7 +245,7 @@ impl Check<'_> {
                 "write an angle above 0 and up to 90",
             );
         }
-        let named = Named { grids: self.grids(&f.grid), rings: self.rings(&f.ring) };
+        let named = Named { grids: self.grids(&f.grid), rings: self.rings(&f.ring, f.faces_in) };
         let repeats = self.repeats(f.repeats.as_ref()).unwrap_or(1);
         let (mut setups, mut parts) = (Vec::new(), Vec::new());
         if f.stage.is_empty() {
@@ -337,11 +342,12 @@ impl Check<'_> {
         out
     }
 
-    fn rings(&mut self, written: &[w::Ring]) -> Vec<(String, Vec<(f64, Along)>)> {
-        let mut out: Vec<(String, Vec<(f64, Along)>)> = Vec::new();
+    fn rings(&mut self, written: &[w::Ring], faces_in: FacesIn) -> Vec<NamedRing> {
+        let mut out: Vec<NamedRing> = Vec::new();
+        let usual = if faces_in == FacesIn::Machine { RingIn::Machine } else { RingIn::Block };
         for r in written {
             let name = r.name.get_ref();
-            if out.iter().any(|(n, _)| n == name) {
+            if out.iter().any(|(n, ..)| n == name) {
                 self.error(
                     r.name.span(),
                     "program::ring_twice",
@@ -370,15 +376,15 @@ impl Check<'_> {
                 elevations.chain(r.depth.iter().map(|&mm| Along::Depth(mm)))
             };
             let points = r.azimuth_deg.iter().flat_map(|&azimuth| along().map(move |v| (azimuth, v))).collect();
-            out.push((name.clone(), points));
+            out.push((name.clone(), r.directions_in.unwrap_or(usual), points));
         }
         out
     }
 
-    fn ring(&mut self, written: &toml::Spanned<String>, rings: &[(String, Vec<(f64, Along)>)]) -> Option<RingPoints> {
-        let found = rings.iter().find(|(name, _)| name == written.get_ref());
+    fn ring(&mut self, written: &toml::Spanned<String>, rings: &[NamedRing]) -> Option<RingPoints> {
+        let found = rings.iter().find(|(name, ..)| name == written.get_ref());
         if found.is_none() {
-            let names: Vec<&str> = rings.iter().map(|(n, _)| n.as_str()).collect();
+            let names: Vec<&str> = rings.iter().map(|(n, ..)| n.as_str()).collect();
             self.error(
                 written.span(),
                 "program::unknown_ring",
@@ -386,7 +392,12 @@ impl Check<'_> {
                 format!("the file has: {}", names.join(", ")),
             );
         }
-        found.map(|(_, points)| RingPoints { name: At::from(written), points: points.clone() })
+        let ring = |(_, frame, points): &NamedRing| RingPoints {
+            name: At::from(written),
+            directions_in: *frame,
+            points: points.clone(),
+        };
+        found.map(ring)
     }
 
     fn setup(

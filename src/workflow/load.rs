@@ -164,15 +164,23 @@ pub fn load_machine(name: &str, path: Option<&Path>, env: &dyn Environment) -> R
     })
 }
 
+/// The text of a machines file, or of the built-in one.
+///
+/// # Errors
+/// When the file cannot be read.
+pub fn machines_file(path: Option<&Path>, env: &dyn Environment) -> Result<Source> {
+    match path {
+        Some(path) => env.source(path),
+        None => Ok(source("machines.toml (built in)", machine::BUILT_IN)),
+    }
+}
+
 /// The machines of a file, or the built-in ones.
 ///
 /// # Errors
 /// When the file is unusable.
 pub fn load_machines(path: Option<&Path>, env: &dyn Environment) -> Result<Vec<Machine>> {
-    let text = match path {
-        Some(path) => env.source(path)?,
-        None => source("machines.toml (built in)", machine::BUILT_IN),
-    };
+    let text = machines_file(path, env)?;
     let (machines, Findings(said)) = machine::load(&text)?;
     env.remark(&said);
     Ok(machines)

@@ -4,6 +4,7 @@
 //! workbench and users of the library call the same.
 
 pub mod active_compensation;
+pub mod auto_program;
 pub mod change;
 mod environment;
 pub mod examine;
@@ -21,5 +22,7 @@ pub mod verify;
 pub mod view;
 
 pub use environment::{Disk, Environment, InMemory};
-pub use load::{Loaded, LoadedRun, load_controller, load_effects, load_machine, load_machines, load_study};
+pub use load::{
+    Loaded, LoadedRun, load_controller, load_effects, load_machine, load_machines, load_study, machines_file,
+};
 pub use read_run::{LogFile, controller_path, load_plan, load_plan_and_machine};

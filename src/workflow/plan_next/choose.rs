@@ -1,6 +1,6 @@
 //! Which touches of which blocks: chosen, proven to be reachable, and what they will tell.
 
-use crate::design::bundle::{Bundle, Manner, as_plan, bundles, program_text, without};
+use crate::design::bundle::{Bundle, Head, Manner, as_plan, bundles, program_text, without};
 use crate::design::choose_touches::{Design, Separation, where_all_have_values};
 use crate::design::questions::{Pair, Questions};
 use crate::design::{Known, LinearisedPlan, Noise, Planned, Room, Task};
@@ -212,7 +212,8 @@ impl<'a> Setting<'a> {
             if chosen.is_empty() {
                 break;
             }
-            let text = program_text(machine, mounting, name, &says(questions), &pool, &chosen);
+            let head = Head { by: "plan-next", name, says: &says(questions), again: &[] };
+            let text = program_text(machine, mounting, &head, &pool, &chosen);
             let (spec, _) = program::load(&source("plan-next", text.clone()))?;
             let (generated, _) = match program::generate(machine, &spec, &Options::default()) {
                 Ok(done) => done,
@@ -261,7 +262,7 @@ impl<'a> Setting<'a> {
         let touches = plan.touches.clone();
         let Some(first) = touches.first() else { return Ok(Vec::new()) };
         let manner = Manner { pose: first.pose, from: first.from, spindle_deg: 0.0, feed_mm_min: 0.0, stylus: None };
-        let all = Bundle { manner, block: String::new(), faces: Vec::new(), touches };
+        let all = Bundle { manner, block: String::new(), faces: Vec::new(), ring: Vec::new(), touches };
         let pool = [all];
         let view = self.view(plan, label, effects)?;
         Ok(Design::new(&view, self.n_given(), &pool, questions).separated(&[0]))

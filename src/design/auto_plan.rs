@@ -1,0 +1,152 @@
+//! Which poses of an artefact are touched where nobody has written a program: first for the worst-determined of the results, then
+//! for power against the whole catalogue, at last the first poses once more.
+//!
+//! Greedy, with updates of low rank of the covariance of all unknowns (Woodbury); every size counts in typical ones.
+
+use super::bundle::{Bundle, cost_s};
+use super::choose_touches::typical_columns;
+use super::linearised_plan::LinearisedPlan;
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Share of the time that goes to the results of the model.
+const FOR_RESULTS: f64 = 0.45;
+
+/// Share of the time that is left for poses that come once more.
+const FOR_AGAIN: f64 = 0.12;
+
+/// Poses that come once more at most.
+const MOST_AGAIN: usize = 3;
+
+/// Prior of the model's unknowns, in typical sizes: wide, for a firm start only.
+const WIDE: f64 = 30.0;
+
+/// What was chosen from a pool.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Choice {
+    /// Bundles, in the order in which they were taken.
+    pub chosen: Vec<usize>,
+    /// Those of them that come once more at the end.
+    pub again: Vec<usize>,
+}
+
+/// Chooses bundles within a time, s. `view`: the touches of the pool, one after the other.
+#[must_use]
+pub fn choose(view: &LinearisedPlan, pool: &[Bundle], budget_s: f64) -> Choice {
+    let (columns, n_base) = typical_columns(view);
+    let rows = columns.rows(0, view.n_touches()).into_owned();
+    let mut at = 0;
+    let ranges: Vec<Range<usize>> = pool
+        .iter()
+        .map(|b| {
+            at += b.touches.len();
+            at - b.touches.len()..at
+        })
+        .collect();
+    // what the set-ups take is no result
+    let results: Vec<usize> = (0..n_base).filter(|&c| !view.model.unknowns[view.free[c]].nuisance).collect();
+
+    let mut chosen = Vec::new();
+    let mut of_model = Covariance::new(rows.columns(0, n_base).into_owned(), |_| WIDE * WIDE);
+    let worst = |c: &Covariance, r: &Range<usize>| c.worst_falls(r, &results);
+    of_model.fill(pool, &ranges, &mut chosen, FOR_RESULTS * budget_s, &worst);
+
+    // an effect of the catalogue has its typical size
+    let mut of_all = Covariance::new(rows, |c| if c < n_base { WIDE * WIDE } else { 1.0 });
+    chosen.iter().for_each(|&i: &usize| of_all.take(&ranges[i]));
+    of_all.fill(pool, &ranges, &mut chosen, (1.0 - FOR_AGAIN) * budget_s, &Covariance::information);
+
+    // plain poses: what is done differently at a pose is no repeat of it
+    let first = |i: &&usize| pool[**i].manner.stylus.is_none();
+    let mut again: Vec<usize> = Vec::new();
+    for &i in chosen.iter().filter(first) {
+        let seconds = cost_s(pool, &chosen) + cost_s(pool, &[&again[..], &[i]].concat());
+        if again.len() < MOST_AGAIN && seconds <= budget_s {
+            again.push(i);
+        }
+    }
+    Choice { chosen, again }
+}
+
+/// Covariance of all unknowns after what was taken.
+struct Covariance {
+    /// Whitened columns: a row for each touch of the pool.
+    rows: DMatrix<f64>,
+    covariance: DMatrix<f64>,
+    /// `rows` times the covariance.
+    seen: DMatrix<f64>,
+}
+
+impl Covariance {
+    /// Nothing is taken yet: the prior variance of each column.
+    fn new(rows: DMatrix<f64>, prior: impl Fn(usize) -> f64) -> Self {
+        let variances = DVector::from_iterator(rows.ncols(), (0..rows.ncols()).map(prior));
+        let covariance = DMatrix::from_diagonal(&variances);
+        Self { seen: &rows * &covariance, rows, covariance }
+    }
+
+    /// A factor of I + A C Aᵀ for the rows A of a bundle, and A C.
+    fn of(&self, range: &Range<usize>) -> Option<(Cholesky<f64, Dyn>, DMatrix<f64>)> {
+        let seen = self.seen.rows(range.start, range.len());
+        let within = seen * self.rows.rows(range.start, range.len()).transpose();
+        let factor = (within + DMatrix::identity(range.len(), range.len())).cholesky()?;
+        Some((factor, seen.into_owned()))
+    }
+
+    /// By how much the worst variances of some columns fall: the fourth power of the standard deviations stands for the worst.
+    fn worst_falls(&self, range: &Range<usize>, columns: &[usize]) -> Option<f64> {
+        let (factor, seen) = self.of(range)?;
+        let mut change = seen.select_columns(columns);
+        if !factor.l_dirty().solve_lower_triangular_mut(&mut change) {
+            return None;
+        }
+        let falls = columns.iter().zip(change.column_iter()).map(|(&c, change)| {
+            let before = self.covariance[(c, c)];
+            before * before - (before - change.norm_squared()).powi(2)
+        });
+        Some(falls.sum())
+    }
+
+    /// Information that a bundle adds: log det (I + A C Aᵀ).
+    fn information(&self, range: &Range<usize>) -> Option<f64> {
+        let (factor, _) = self.of(range)?;
+        Some(2.0 * factor.l_dirty().diagonal().iter().map(|x| x.ln()).sum::<f64>())
+    }
+
+    fn take(&mut self, range: &Range<usize>) {
+        let Some((factor, mut change)) = self.of(range) else { return };
+        if factor.l_dirty().solve_lower_triangular_mut(&mut change) {
+            self.seen -= (&self.rows * change.transpose()) * &change;
+            self.covariance -= change.tr_mul(&change);
+        }
+    }
+
+    /// Takes what gains most for its time until nothing more fits.
+    fn fill(
+        &mut self,
+        pool: &[Bundle],
+        ranges: &[Range<usize>],
+        chosen: &mut Vec<usize>,
+        budget_s: f64,
+        gain: &(dyn Fn(&Self, &Range<usize>) -> Option<f64> + Sync),
+    ) {
+        loop {
+            let spent = cost_s(pool, chosen);
+            let per_second = |i: usize| {
+                let seconds = cost_s(pool, &[&chosen[..], &[i]].concat());
+                let gain = (seconds <= budget_s).then(|| gain(self, &ranges[i]))??;
+                Some((gain / (seconds - spent), i)).filter(|g| g.0 > 0.0)
+            };
+            let open = (0..pool.len()).into_par_iter().filter(|i| !chosen.contains(i));
+            // ties go to the earlier bundle: the same choice in every run
+            match open.filter_map(per_second).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))) {
+                Some((_, i)) => {
+                    self.take(&ranges[i]);
+                    chosen.push(i);
+                }
+                None => return,
+            }
+        }
+    }
+}
