@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Share of the time that goes to the results of the model.
-const FOR_RESULTS: f64 = 0.45;
+const FOR_RESULTS: f64 = 0.6;
 
 /// Share of the time that is left for poses that come once more.
 const FOR_AGAIN: f64 = 0.12;

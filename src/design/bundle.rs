@@ -14,7 +14,8 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 /// Angles of an axis that swivels, deg.
-const SWIVELS_DEG: [f64; 11] = [0.0, -90.0, -75.0, -60.0, -45.0, -30.0, -15.0, 20.0, 45.0, 75.0, 90.0];
+const SWIVELS_DEG: [f64; 15] =
+    [0.0, -90.0, -75.0, -60.0, -45.0, -30.0, -15.0, 20.0, 45.0, 75.0, 90.0, -120.0, 120.0, 150.0, 180.0];
 
 /// Angles of an axis that turns all the way, deg: no common step.
 const TURNS_DEG: [f64; 7] = [0.0, 45.0, 100.0, 160.0, 225.0, 270.0, 310.0];

@@ -447,10 +447,12 @@ impl Model {
         self.tool.iter().chain(&self.workpiece[..carried]).any(|l| l.axis.name == axis)
     }
 
-    /// Can an effect be told apart from nothing in these runs? One that says how a run differs from the first needs two.
+    /// Can an effect be told apart from nothing in these runs? One that says how a run differs from the first needs two, one of
+    /// spheres needs a sphere.
     #[must_use]
     pub fn has_parameters_of(&self, effect: &Effect) -> bool {
-        !instances_of(effect, &self.set_ups).is_empty()
+        let of_these = effect.of.is_empty() || self.set_ups.iter().any(|s| effect.of.contains(&s.body));
+        of_these && !instances_of(effect, &self.set_ups).is_empty()
     }
 
     /// The set-ups of the blocks.

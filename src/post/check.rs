@@ -119,6 +119,7 @@ pub(super) fn parse(source: &Source) -> Result<(Postprocessor, Findings)> {
         tables: file.tables.clone(),
         releases: file.release.clone(),
         dry_run_mm: 0.0,
+        without_dry_run: false,
         text: text.clone(),
         templates,
     };

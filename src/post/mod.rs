@@ -103,6 +103,8 @@ pub struct Postprocessor {
     pub releases: Vec<Release>,
     /// Height of a dry run, mm; 0: the program measures.
     pub dry_run_mm: f64,
+    /// Its programs have no switch for a dry run.
+    pub without_dry_run: bool,
     /// The file as it was read.
     pub text: String,
     templates: minijinja::Environment<'static>,

@@ -55,11 +55,26 @@ pub fn generate(
             generated.plan.notes.push(note);
         }
     }
-    let nc = post.program(machine, &generated.plan, &generated.path)?;
     env.remark(&findings.0);
+    let written = |post: &Postprocessor| {
+        let nc = post.program(machine, &generated.plan, &generated.path)?;
+        let name = format!("{}.{}", spec.name, nc.extension);
+        let proven = prove(machine, post, &generated.plan, &name, &nc, env)?;
+        Ok((nc, proven))
+    };
+    let (nc, proven) = match written(post) {
+        // moves that are clear where they are need not be clear when they are lifted
+        Err(failure) if post.dry_run_mm == 0.0 => {
+            let mut plain = post.clone();
+            plain.without_dry_run = true;
+            let without = written(&plain).map_err(|_: Failure| failure)?;
+            let says = "the program has no dry run: lifted, its moves would meet something";
+            env.remark(&[Finding::warning("generate::no_dry_run", says).help("run it at a low feed override the first time")]);
+            without
+        }
+        other => other?,
+    };
     env.remark(&nc.findings.0);
-    let name = format!("{}.{}", spec.name, nc.extension);
-    let proven = prove(machine, post, &generated.plan, &name, &nc, env)?;
     // the figure of `check`, move by move as this control makes them
     let seconds = proven.as_ref().map_or(generated.path.seconds, |(_, s)| s + generated.path.waiting);
     Ok(ForControl { generated, nc, proof: proven.map(|(proof, _)| proof), seconds })

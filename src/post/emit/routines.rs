@@ -138,7 +138,7 @@ impl Writer<'_> {
 
     /// The linear axis that lifts the probe, and its top. Under a transformation no word of the program is that axis alone.
     fn lift_top(&self) -> Option<(AxisName, f64)> {
-        let axis = self.opening.lift().filter(|_| !self.frame.is_tcp())?;
+        let axis = self.opening.lift().filter(|_| !self.frame.is_tcp() && !self.post.without_dry_run)?;
         let top = self.opening.steps.iter().find_map(|at| match self.path.steps.get(*at) {
             Some(Step::Rapid { to }) => to.get(axis),
             _ => None,
