@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 
 /// Share of the time that goes to the results of the model.
-const FOR_RESULTS: f64 = 0.6;
+const FOR_RESULTS: f64 = 0.4;
 
 /// Share of the time that is left for poses that come once more.
 const FOR_AGAIN: f64 = 0.12;
@@ -36,37 +36,63 @@ pub struct Choice {
 pub fn choose(view: &LinearisedPlan, pool: &[Bundle], budget_s: f64) -> Choice {
     let (columns, n_base) = typical_columns(view);
     let rows = columns.rows(0, view.n_touches()).into_owned();
-    let mut at = 0;
-    let ranges: Vec<Range<usize>> = pool
-        .iter()
-        .map(|b| {
-            at += b.touches.len();
-            at - b.touches.len()..at
-        })
-        .collect();
+    let visits = Visits::of(pool);
     // what the set-ups take is no result
     let results: Vec<usize> = (0..n_base).filter(|&c| !view.model.unknowns[view.free[c]].nuisance).collect();
 
     let mut chosen = Vec::new();
     let mut of_model = Covariance::new(rows.columns(0, n_base).into_owned(), |_| WIDE * WIDE);
     let worst = |c: &Covariance, r: &Range<usize>| c.worst_falls(r, &results);
-    of_model.fill(pool, &ranges, &mut chosen, FOR_RESULTS * budget_s, &worst);
+    of_model.fill(pool, &visits, &mut chosen, FOR_RESULTS * budget_s, &worst);
 
     // an effect of the catalogue has its typical size
     let mut of_all = Covariance::new(rows, |c| if c < n_base { WIDE * WIDE } else { 1.0 });
-    chosen.iter().for_each(|&i: &usize| of_all.take(&ranges[i]));
-    of_all.fill(pool, &ranges, &mut chosen, (1.0 - FOR_AGAIN) * budget_s, &Covariance::information);
+    chosen.iter().for_each(|&i: &usize| of_all.take(&visits.rows[i]));
+    of_all.fill(pool, &visits, &mut chosen, (1.0 - FOR_AGAIN) * budget_s, &Covariance::information);
 
     // plain poses: what is done differently at a pose is no repeat of it
-    let first = |i: &&usize| pool[**i].manner.stylus.is_none();
     let mut again: Vec<usize> = Vec::new();
-    for &i in chosen.iter().filter(first) {
-        let seconds = cost_s(pool, &chosen) + cost_s(pool, &[&again[..], &[i]].concat());
+    for &v in chosen.iter().filter(|v| pool[visits.bundles[**v].start].manner.stylus.is_none()) {
+        let seconds = visits.cost_s(pool, &chosen) + visits.cost_s(pool, &[&again[..], &[v]].concat());
         if again.len() < MOST_AGAIN && seconds <= budget_s {
-            again.push(i);
+            again.push(v);
         }
     }
-    Choice { chosen, again }
+    Choice { chosen: visits.members(&chosen), again: visits.members(&again) }
+}
+
+/// Bundles in one manner, which follow one another in a pool: the rotary axes go there once for all of them.
+struct Visits {
+    bundles: Vec<Range<usize>>,
+    /// Rows of their touches.
+    rows: Vec<Range<usize>>,
+}
+
+impl Visits {
+    fn of(pool: &[Bundle]) -> Self {
+        let (mut bundles, mut rows): (Vec<Range<usize>>, Vec<Range<usize>>) = (Vec::new(), Vec::new());
+        let mut at = 0;
+        for (i, b) in pool.iter().enumerate() {
+            let end = at + b.touches.len();
+            match (bundles.last_mut(), rows.last_mut()) {
+                (Some(own), Some(of_own)) if pool[own.start].manner == b.manner => (own.end, of_own.end) = (i + 1, end),
+                _ => {
+                    bundles.push(i..i + 1);
+                    rows.push(at..end);
+                }
+            }
+            at = end;
+        }
+        Self { bundles, rows }
+    }
+
+    fn members(&self, visits: &[usize]) -> Vec<usize> {
+        visits.iter().flat_map(|&v| self.bundles[v].clone()).collect()
+    }
+
+    fn cost_s(&self, pool: &[Bundle], visits: &[usize]) -> f64 {
+        cost_s(pool, &self.members(visits))
+    }
 }
 
 /// Covariance of all unknowns after what was taken.
@@ -126,23 +152,23 @@ impl Covariance {
     fn fill(
         &mut self,
         pool: &[Bundle],
-        ranges: &[Range<usize>],
+        visits: &Visits,
         chosen: &mut Vec<usize>,
         budget_s: f64,
         gain: &(dyn Fn(&Self, &Range<usize>) -> Option<f64> + Sync),
     ) {
         loop {
-            let spent = cost_s(pool, chosen);
+            let spent = visits.cost_s(pool, chosen);
             let per_second = |i: usize| {
-                let seconds = cost_s(pool, &[&chosen[..], &[i]].concat());
-                let gain = (seconds <= budget_s).then(|| gain(self, &ranges[i]))??;
+                let seconds = visits.cost_s(pool, &[&chosen[..], &[i]].concat());
+                let gain = (seconds <= budget_s).then(|| gain(self, &visits.rows[i]))??;
                 Some((gain / (seconds - spent), i)).filter(|g| g.0 > 0.0)
             };
-            let open = (0..pool.len()).into_par_iter().filter(|i| !chosen.contains(i));
-            // ties go to the earlier bundle: the same choice in every run
+            let open = (0..visits.rows.len()).into_par_iter().filter(|i| !chosen.contains(i));
+            // ties go to the earlier visit: the same choice in every run
             match open.filter_map(per_second).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))) {
                 Some((_, i)) => {
-                    self.take(&ranges[i]);
+                    self.take(&visits.rows[i]);
                     chosen.push(i);
                 }
                 None => return,

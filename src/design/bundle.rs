@@ -68,6 +68,14 @@ pub struct Bundle {
     pub touches: Vec<PlanTouch>,
 }
 
+impl Bundle {
+    /// Does it touch the same block in the same manner, be it at fewer points?
+    #[must_use]
+    pub fn is_of(&self, other: &Self) -> bool {
+        self.block == other.block && self.manner == other.manner
+    }
+}
+
 /// Every bundle of a mounting that the axes' ranges allow. Collisions are for the program's own proof.
 #[must_use]
 pub fn bundles(machine: &Machine, mounting: &Mounting) -> Vec<Bundle> {
@@ -253,12 +261,24 @@ fn touch(
     })
 }
 
+/// What is one visit of the rotary axes in the plan of a pool.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum VisitOf {
+    /// Each bundle: each can be chosen alone.
+    Bundle,
+    /// All bundles in one manner: they are chosen together.
+    Manner,
+}
+
 /// All bundles as the touches of one plan, in their order; `time_s` is when all of them are made: what drifts is not
 /// stretched by the length of the pool.
 #[must_use]
-pub fn as_plan(machine: &Machine, mounting: &Mounting, bundles: &[Bundle], time_s: f64) -> Plan {
+pub fn as_plan(machine: &Machine, mounting: &Mounting, bundles: &[Bundle], time_s: f64, visits: VisitOf) -> Plan {
     let mut touches = Vec::new();
-    for (bundle, visit) in bundles.iter().zip(1..) {
+    let mut visit = 0;
+    for (i, bundle) in bundles.iter().enumerate() {
+        let goes_on = i > 0 && bundles[i - 1].manner == bundle.manner && visits == VisitOf::Manner;
+        visit += u32::from(!goes_on);
         for t in &bundle.touches {
             let id = touches.len() as u64 + 1;
             touches.push(PlanTouch { id, visit: Some(visit), time_s: Some(time_s), ..t.clone() });

@@ -1,14 +1,14 @@
 //! A program that nobody has written: chosen for a machine and what is mounted on it, proven to be reachable.
 
 use super::new::default_effects;
-use crate::design::auto_plan::choose;
-use crate::design::bundle::{Head, as_plan, bundles, program_text, without};
+use crate::design::auto_plan::{Choice, choose};
+use crate::design::bundle::{Bundle, Head, VisitOf, as_plan, bundles, program_text, without};
 use crate::design::{LinearisedPlan, Noise, Planned, Task};
 use crate::diag::{Failure, Result, source};
 use crate::fit::effects_of;
 use crate::machine::{Machine, Mounting};
 use crate::model::catalogue::Catalogue;
-use crate::program::{self, Options, ProgramSpec};
+use crate::program::{self, Generated, Options, ProgramSpec};
 use crate::units::mm_from_um;
 
 /// Rounds of choosing, proving and leaving out what cannot be reached.
@@ -43,38 +43,26 @@ pub fn auto_program(
             .help("20 is a good beginning"));
     }
     let budget_s = 60.0 * minutes;
+    let says = format!("chosen for {}: {minutes} minutes with {:?}", machine.name, mounting.name);
+    let write = |pool: &[Bundle], choice: &Choice| {
+        let head = Head { by: "generate --program auto", name: "auto", says: &says, again: &choice.again };
+        program_text(machine, mounting, &head, pool, &choice.chosen)
+    };
     let mut pool = bundles(machine, mounting);
-    let (mut scale, mut best): (f64, Option<(f64, AutoProgram)>) = (1.0, None);
+    let mut scale = 1.0;
+    let mut best: Option<(f64, String)> = None;
     let mut why: Option<Failure> = None;
     for _ in 0..MOST_ROUNDS {
         if pool.is_empty() {
             break;
         }
-        let planned = as_plan(machine, mounting, &pool, budget_s / 2.0);
-        let effects = default_effects(machine, &[&planned], false);
-        let task = Task {
-            machine,
-            catalogue,
-            effects: effects_of(&effects, catalogue, machine)?,
-            held: Vec::new(),
-            reference: machine.reference.pivot,
-            temperature: false,
-        };
-        let noise = Noise {
-            sigma_mm: mm_from_um(machine.probe.repeatability_um),
-            tau_mm: machine.rotary().map(|a| a.indexing_repeatability_mm.powi(2)).sum::<f64>().sqrt(),
-        };
-        let view = LinearisedPlan::new(&task, &[Planned::new(planned)], &[], noise)?;
-        let choice = choose(&view, &pool, budget_s * scale);
+        let choice = choose(&linearised(machine, catalogue, mounting, &pool, budget_s)?, &pool, budget_s * scale);
         if choice.chosen.is_empty() {
             break;
         }
-        let says = format!("chosen for {}: {minutes} minutes with {:?}", machine.name, mounting.name);
-        let head = Head { by: "generate --program auto", name: "auto", says: &says, again: &choice.again };
-        let text = program_text(machine, mounting, &head, &pool, &choice.chosen);
-        let (spec, _) = program::load(&source("auto.toml", text.clone()))?;
-        let made = match program::generate(machine, &spec, &Options::default()) {
-            Ok((made, _)) => made,
+        let mut text = write(&pool, &choice);
+        let made = match prove(machine, &text) {
+            Ok(made) => made,
             Err(failure) => {
                 // nothing of it can be reached: what was chosen is no choice
                 why = Some(failure);
@@ -84,19 +72,23 @@ pub fn auto_program(
             }
         };
         let used = made.path.seconds / budget_s;
-        let lost = !made.plan.skipped.is_empty();
-        let fits = used <= USED[1];
-        let found = AutoProgram { text, spec };
-        // a program without a gap before one with, then the longer one
-        let worth = if lost { used - 1.0 } else { used };
-        if fits && best.as_ref().is_none_or(|(w, _)| worth > *w) {
-            best = Some((worth, found));
+        let lost = made.plan.skipped.len() as f64 / (made.plan.skipped.len() + made.plan.touches.len()) as f64;
+        if !made.plan.skipped.is_empty() {
+            // what is left of the same choice is a program without a gap
+            let left = without(&pool, &made.plan.skipped);
+            let again = |of: &[usize]| -> Vec<usize> {
+                let same = |i: &usize| left.iter().position(|b| b.is_of(&pool[*i]));
+                of.iter().filter_map(same).collect()
+            };
+            text = write(&left, &Choice { chosen: again(&choice.chosen), again: again(&choice.again) });
+            pool = left;
         }
-        if fits && !lost && used >= USED[0] {
-            break;
-        }
-        if lost {
-            pool = without(&pool, &made.plan.skipped);
+        let worth = used - 2.0 * lost;
+        if used <= USED[1] && best.as_ref().is_none_or(|(w, _)| worth > *w) {
+            best = Some((worth, text));
+            if worth >= USED[0] {
+                break;
+            }
         }
         scale = (scale / used * 0.97).clamp(0.05, 20.0);
     }
@@ -109,5 +101,37 @@ pub fn auto_program(
             .help("more minutes (--minutes), or another place for the artefact")
         })
     };
-    best.map(|(_, program)| program).ok_or_else(nothing)
+    let (_, text) = best.ok_or_else(nothing)?;
+    let (spec, _) = program::load(&source("auto.toml", text.clone()))?;
+    Ok(AutoProgram { text, spec })
+}
+
+fn prove(machine: &Machine, text: &str) -> Result<Generated> {
+    let (spec, _) = program::load(&source("auto.toml", text.to_owned()))?;
+    Ok(program::generate(machine, &spec, &Options::default())?.0)
+}
+
+/// The touches of a pool as a plan sees them, the whole catalogue beside the model.
+fn linearised(
+    machine: &Machine,
+    catalogue: &Catalogue,
+    mounting: &Mounting,
+    pool: &[Bundle],
+    budget_s: f64,
+) -> Result<LinearisedPlan> {
+    let planned = as_plan(machine, mounting, pool, budget_s / 2.0, VisitOf::Manner);
+    let effects = default_effects(machine, &[&planned], false);
+    let task = Task {
+        machine,
+        catalogue,
+        effects: effects_of(&effects, catalogue, machine)?,
+        held: Vec::new(),
+        reference: machine.reference.pivot,
+        temperature: false,
+    };
+    let noise = Noise {
+        sigma_mm: mm_from_um(machine.probe.repeatability_um),
+        tau_mm: machine.rotary().map(|a| a.indexing_repeatability_mm.powi(2)).sum::<f64>().sqrt(),
+    };
+    LinearisedPlan::new(&task, &[Planned::new(planned)], &[], noise)
 }

@@ -69,7 +69,9 @@ pub fn generate(
             plain.without_dry_run = true;
             let without = written(&plain).map_err(|_: Failure| failure)?;
             let says = "the program has no dry run: lifted, its moves would meet something";
-            env.remark(&[Finding::warning("generate::no_dry_run", says).help("run it at a low feed override the first time")]);
+            env.remark(&[
+                Finding::warning("generate::no_dry_run", says).help("run it at a low feed override the first time")
+            ]);
             without
         }
         other => other?,

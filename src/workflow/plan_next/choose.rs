@@ -1,6 +1,6 @@
 //! Which touches of which blocks: chosen, proven to be reachable, and what they will tell.
 
-use crate::design::bundle::{Bundle, Head, Manner, as_plan, bundles, program_text, without};
+use crate::design::bundle::{Bundle, Head, Manner, VisitOf, as_plan, bundles, program_text, without};
 use crate::design::choose_touches::{Design, Separation, where_all_have_values};
 use crate::design::questions::{Pair, Questions};
 use crate::design::{Known, LinearisedPlan, Noise, Planned, Room, Task};
@@ -188,7 +188,7 @@ impl<'a> Setting<'a> {
             if pool.is_empty() {
                 break;
             }
-            let planned = as_plan(machine, mounting, &pool, budget_s / 2.0);
+            let planned = as_plan(machine, mounting, &pool, budget_s / 2.0, VisitOf::Bundle);
             let view = self.view(&planned, label, effects)?;
             if !view.left_out.is_empty() {
                 let (left, says) = where_all_have_values(&view, self.n_given(), effects, &pool);
