@@ -14,7 +14,8 @@ fn main() {
     let n_virtual = words.next().unwrap_or(runs / 10);
     let mut wrong = Vec::new();
     let mut table = String::new();
-    for case in &coverage::CASES {
+    // the machines' own blocks, then every artefact on every machine
+    for case in coverage::CASES.iter().chain(&coverage::ARTEFACTS) {
         let begun = std::time::Instant::now();
         let summary = coverage::run(case, runs, n_virtual, 20);
         println!(
@@ -74,9 +75,10 @@ fn line(case: &coverage::Case, summary: &coverage::Summary, results: &[&coverage
     // a scatter that neither the study states nor the plan can tell is the declared one
     let declared = case.tau_mm > 0.0 && case.stated_tau_mm.is_none() && !summary.tau_estimated;
     format!(
-        "| {} {}, {tau} µm{}{} | {:.3} | {:.3} … {:.3} over {} results | {:.1} … {:.1} % |\n",
+        "| {} {}{}, {tau} µm{}{} | {:.3} | {:.3} … {:.3} over {} results | {:.1} … {:.1} % |\n",
         case.machine,
         case.programs.join(" + "),
+        case.artefact.map_or_else(String::new, |a| format!(" with {a}")),
         if declared { ", as the machine's file declares it" } else { "" },
         case.planted.iter().map(|(id, _)| format!(", {id} in machine and model")).collect::<String>(),
         summary.chi2_per_dof,

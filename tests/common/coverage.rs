@@ -27,6 +27,8 @@ use std::collections::BTreeMap;
 pub struct Case {
     pub machine: &'static str,
     pub programs: &'static [&'static str],
+    /// What is mounted, with a program of 20 minutes that is chosen for it; `None`: the machine's own blocks.
+    pub artefact: Option<&'static str>,
     pub effects: &'static [&'static str],
     /// Noise of a touch and of a visit, mm.
     pub sigma_mm: f64,
@@ -42,6 +44,7 @@ pub const CASES: [Case; 9] = [
     Case {
         machine: "swivel-head",
         programs: &["head", "table"],
+        artefact: None,
         effects: &["location-b", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.0,
@@ -52,6 +55,7 @@ pub const CASES: [Case; 9] = [
     Case {
         machine: "swivel-head",
         programs: &["head", "table"],
+        artefact: None,
         effects: &["location-b", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: std::f64::consts::FRAC_1_SQRT_2 * 1e-3,
@@ -61,6 +65,7 @@ pub const CASES: [Case; 9] = [
     Case {
         machine: "swivel-head",
         programs: &["full"],
+        artefact: None,
         effects: &["location-b", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.0,
@@ -70,6 +75,7 @@ pub const CASES: [Case; 9] = [
     Case {
         machine: "swivel-head",
         programs: &["full"],
+        artefact: None,
         effects: &["location-b", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.5e-3,
@@ -79,6 +85,7 @@ pub const CASES: [Case; 9] = [
     Case {
         machine: "trunnion",
         programs: &["basic"],
+        artefact: None,
         effects: &["location-a", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.0,
@@ -88,6 +95,7 @@ pub const CASES: [Case; 9] = [
     Case {
         machine: "trunnion",
         programs: &["full"],
+        artefact: None,
         effects: &["location-a", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.5e-3,
@@ -97,6 +105,7 @@ pub const CASES: [Case; 9] = [
     Case {
         machine: "double-head",
         programs: &["full"],
+        artefact: None,
         effects: &["location-b", "location-a", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.5e-3,
@@ -106,6 +115,7 @@ pub const CASES: [Case; 9] = [
     Case {
         machine: "swivel-table-b",
         programs: &["full"],
+        artefact: None,
         effects: &["location-b", "location-c", "block-setup", "pretravel"],
         sigma_mm: 1e-3,
         tau_mm: 0.5e-3,
@@ -116,6 +126,7 @@ pub const CASES: [Case; 9] = [
     Case {
         machine: "trunnion",
         programs: &["full"],
+        artefact: None,
         effects: &["location-a", "location-c", "block-setup", "pretravel", "warm-up"],
         sigma_mm: 1e-3,
         tau_mm: 0.5e-3,
@@ -123,6 +134,61 @@ pub const CASES: [Case; 9] = [
         stated_tau_mm: None,
     },
 ];
+
+/// One artefact on one machine.
+const fn on(machine: &'static str, artefact: &'static str, effects: &'static [&'static str]) -> Case {
+    Case {
+        machine,
+        programs: &["auto"],
+        artefact: Some(artefact),
+        effects,
+        sigma_mm: 1e-3,
+        tau_mm: 0.5e-3,
+        planted: &[],
+        stated_tau_mm: Some(0.5e-3),
+    }
+}
+
+/// Effects of a model: two location errors and where a body stands.
+macro_rules! model {
+    ($one:literal, $other:literal, $($body:literal),+) => { &[$one, $other, $($body,)+ "pretravel"] };
+}
+
+/// Every artefact on every built-in machine.
+pub const ARTEFACTS: [Case; 30] = {
+    macro_rules! all {
+        ($(($machine:literal, $one:literal, $other:literal)),+) => {
+            [$(
+                on($machine, "sphere", model!($one, $other, "sphere-setup")),
+                on($machine, "two-spheres", model!($one, $other, "sphere-setup")),
+                on($machine, "ring", model!($one, $other, "cylinder-setup")),
+                on($machine, "pin", model!($one, $other, "cylinder-setup", "cylinder-height")),
+                on($machine, "cube", model!($one, $other, "block-setup")),
+            )+]
+        };
+    }
+    all!(
+        ("trunnion", "location-a", "location-c"),
+        ("swivel-table-b", "location-b", "location-c"),
+        ("swivel-head", "location-b", "location-c"),
+        ("double-head", "location-a", "location-b"),
+        ("nutating-b", "location-b", "location-c"),
+        ("trunnion-offset", "location-a", "location-c")
+    )
+};
+
+/// The machine of a case with what is mounted, and the plans.
+fn mounted(case: &Case) -> (Machine, Vec<Plan>) {
+    let Some(artefact) = case.artefact else {
+        let machine = machine(case.machine);
+        let plans = case.programs.iter().map(|p| plan(&machine, p)).collect();
+        return (machine, plans);
+    };
+    let (machine, auto) = with_artefact(case.machine, artefact, 20.0);
+    let (generated, _) =
+        axiscal::program::generate(&machine, &auto.spec, &axiscal::program::Options::default()).unwrap();
+    (machine, vec![generated.plan])
+}
 
 /// One parameter over all runs.
 #[derive(Debug, Clone)]
@@ -215,10 +281,9 @@ fn noisy(perfect: &Data, plans: &[Plan], case: &Case, rng: &mut ChaCha8Rng) -> D
 
 /// Runs a case.
 pub fn run(case: &Case, runs: usize, n_virtual: usize, seed: u64) -> Summary {
-    let machine = machine(case.machine);
+    let (machine, plans) = mounted(case);
     let catalogue = Catalogue::built_in().unwrap();
     let scenario = wrong(&machine, case, &mut ChaCha8Rng::seed_from_u64(seed));
-    let plans: Vec<Plan> = case.programs.iter().map(|p| plan(&machine, p)).collect();
     let measure = |scenario: &Scenario| -> Data {
         let touches: Vec<Vec<Touch>> = plans.iter().map(|p| touch(&machine, p, scenario, None)).collect();
         let runs: Vec<Run> = plans

@@ -9,11 +9,12 @@ pub mod verbs;
 use axiscal::diag::source;
 use axiscal::fit::{self, Fit, Settings};
 use axiscal::log::{RawTouch, Touch};
-use axiscal::machine::{self, Machine};
+use axiscal::machine::{self, Machine, artefact};
 use axiscal::model::catalogue::Catalogue;
 use axiscal::model::data::Run;
 use axiscal::program::{self, plan::Plan};
 use axiscal::simulate::{self, Compensation, Scenario};
+use axiscal::workflow::auto_program::{AutoProgram, auto_program};
 
 /// How many cases a statistical test makes: the small number, or the large one where AXISCAL_FULL_COUNTS is set.
 pub fn count(small: u64, large: u64) -> u64 {
@@ -32,6 +33,16 @@ pub fn machine(name: &str) -> Machine {
 pub fn plan(machine: &Machine, name: &str) -> Plan {
     let spec = program::choose(program::built_in().unwrap(), name, machine).unwrap();
     program::generate(machine, &spec, &program::Options::default()).unwrap().0.plan
+}
+
+/// A built-in machine with a built-in artefact mounted, and the program that is chosen for it.
+pub fn with_artefact(machine: &str, artefact: &str, minutes: f64) -> (Machine, AutoProgram) {
+    let (_, text) = artefact::BUILT_IN.iter().find(|(name, _)| *name == artefact).unwrap();
+    let machines = source("machines.toml", axiscal::machine::BUILT_IN);
+    let (mounted, _) = artefact::mount(&machines, &self::machine(machine), &source("artefact.toml", *text)).unwrap();
+    let mounting = mounted.machine.mounting(artefact).unwrap();
+    let auto = auto_program(&mounted.machine, &Catalogue::built_in().unwrap(), mounting, minutes).unwrap();
+    (mounted.machine.clone(), auto)
 }
 
 /// Every touch of a plan on the virtual machine; all must hit.

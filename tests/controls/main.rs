@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a panic in a test is a failure with its place
 
 mod any_machine;
+mod artefacts;
 mod beside_the_axis;
 mod check;
 mod check_branches;

@@ -129,10 +129,10 @@ typedef struct {
 
 typedef struct {
     char name[NAME];
-    int is_block, is_cylinder, carrier;
+    int is_block, is_cylinder, is_sphere, carrier;
     vec centre;              /* in the carrier's frame */
     rot turn;                /* shape axes -> carrier */
-    vec half;                /* box: half edges. Cylinder about its own z: x = radius, z = half height */
+    vec half;                /* box: half edges. Cylinder about its own z: x = radius, z = half height. Sphere: x = radius */
     double reach;            /* radius of the sphere around it */
 } shape_t;
 
@@ -244,6 +244,7 @@ static double min2(double a, double b) { return a < b ? a : b; }
 /* Exact signed distance of a point (in the shape's own axes) to the shape: positive outside, faces,
  * edges and corners included. */
 static double distance(const shape_t *s, vec p) {
+    if (s->is_sphere) return length(p) - s->half.x;
     if (s->is_cylinder) {
         double r = sqrt(p.x * p.x + p.y * p.y) - s->half.x, h = fabs(p.z) - s->half.z;
         double ro = max2(r, 0), ho = max2(h, 0);
@@ -279,11 +280,13 @@ static vec clamp_across(vec v, double r) {
 }
 static double clamp(double x, double low, double high) { return x < low ? low : x > high ? high : x; }
 static vec nearest_in_shape(const shape_t *s, vec p) {
+    if (s->is_sphere) return clamp_across(p, s->half.x);
     double z = clamp(p.z, -s->half.z, s->half.z);
     if (!s->is_cylinder) return V(clamp(p.x, -s->half.x, s->half.x), clamp(p.y, -s->half.y, s->half.y), z);
     return add(clamp_across(V(p.x, p.y, 0), s->half.x), V(0, 0, z));
 }
 static double reach_of_shape(const shape_t *s, vec d) { /* largest d.x in the shape */
+    if (s->is_sphere) return s->half.x * length(d);
     if (s->is_cylinder) return s->half.x * sqrt(d.x * d.x + d.y * d.y) + s->half.z * fabs(d.z);
     return s->half.x * fabs(d.x) + s->half.y * fabs(d.y) + s->half.z * fabs(d.z);
 }
@@ -462,6 +465,7 @@ static vec unit(vec a) { double l = length(a); return l > 0 ? mul(1 / l, a) : V(
  *     body from to radius                                          (along `up` from the ball's centre)
  *     box NAME block|solid CARRIER centre(3) size(3)  pivot(3) shift(3) tilt(3)
  *     cylinder NAME solid CARRIER foot(3) direction(3) radius height
+ *     sphere NAME block CARRIER centre(3) radius
  *     noise touch visit               seed n      pretravel mm     latch edge|servo     report PATH
  * A displaced box: p' = pivot + shift + Rz(c) Ry(b) Rx(a) (p - pivot).                                    */
 static int read_line(char *p) {
@@ -527,13 +531,21 @@ static int read_line(char *p) {
         w.bodies++;
         return 1;
     }
-    if (!strcmp(key, "box") || !strcmp(key, "cylinder")) {
+    if (!strcmp(key, "box") || !strcmp(key, "cylinder") || !strcmp(key, "sphere")) {
         shape_t *s = &w.shape[w.shapes];
         if (w.shapes == SHAPES || !word(&p, s->name, NAME) || !word(&p, kind, NAME) || !word(&p, parent, NAME) ||
             (s->carrier = carrier_named(parent)) < -1) return 0;
         s->is_block = !strcmp(kind, "block");
         s->is_cylinder = key[0] == 'c';
-        if (s->is_cylinder) {
+        s->is_sphere = key[0] == 's';
+        if (s->is_sphere) {
+            double none[6] = {0, 0, 0, 0, 0, 0};
+            if (!numbers(&p, d, 4)) return 0;
+            s->turn = error_frame(none).r;
+            s->centre = V(d[0], d[1], d[2]);
+            s->half = V(d[3], d[3], d[3]);
+            s->reach = d[3];
+        } else if (s->is_cylinder) {
             if (!numbers(&p, d, 8)) return 0;
             vec z = unit(V(d[3], d[4], d[5]));
             vec x = unit(fabs(z.x) < 0.9 ? cross(z, V(1, 0, 0)) : cross(z, V(0, 1, 0))), y = cross(z, x);

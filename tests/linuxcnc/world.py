@@ -326,11 +326,23 @@ def text_of(machine, plan, scenario, *, latch, report, solids=True, where="plan"
     for b in plan["blocks"]:
         carrier = machine.carrier(b["carrier"], f"{where}: block {b['name']}")
         shift, tilt = displaced.get(b["name"], still)
-        out.append(row("box", slug(b["name"]), "block", carrier, *b["centre"], *b["size"], *b["centre"], *shift, *tilt))
+        form = b.get("form", "box")
+        if form == "sphere":
+            stands = [c + s for c, s in zip(b["centre"], shift)]
+            out.append(row("sphere", slug(b["name"]), "block", carrier, *stands, b["diameter"] / 2))
+        elif form == "box":
+            out.append(row("box", slug(b["name"]), "block", carrier, *b["centre"], *b["size"], *b["centre"], *shift, *tilt))
+        else:
+            raise Unusable(f"{where}: block {b['name']}: the rig has boxes and spheres, no {form}")
         described = next((d for d in (mounting or {}).get("block", []) if d["name"] == b["name"]), {})
         riser = described.get("riser", (mounting or {}).get("riser"))
         if riser and solids:                    # stands under its block and is displaced with it
             foot = [b["centre"][0], b["centre"][1], b["centre"][2] - (b["size"][2] + riser["height"]) / 2]
+            if "diameter" in riser:             # a stem: it is displaced with its sphere and does not tilt
+                low = [f + s for f, s in zip([*foot[:2], foot[2] - riser["height"] / 2], shift)]
+                out.append(row("cylinder", slug("stem " + b["name"]), "solid", carrier, *low, 0, 0, 1,
+                               riser["diameter"] / 2, riser["height"]))
+                continue
             out.append(row("box", slug("riser " + b["name"]), "solid", carrier, *foot, *riser["size"], riser["height"],
                            *b["centre"], *shift, *tilt))
     if solids:

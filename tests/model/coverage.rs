@@ -5,9 +5,11 @@ use crate::coverage_cases as coverage;
 #[test]
 fn uncertainties_are_those_of_the_errors() {
     let (mut wrong, mut all) = (Vec::new(), Vec::new());
-    for case in &coverage::CASES {
+    // each artefact once, each machine once; all of them: `examples/coverage.rs`
+    let artefacts = coverage::ARTEFACTS.iter().step_by(6);
+    for case in coverage::CASES.iter().chain(artefacts) {
         let summary = coverage::run(case, 300, 30, 20);
-        println!("{} {:?}: {summary:?}", case.machine, case.programs);
+        println!("{} {:?} {:?}: {summary:?}", case.machine, case.programs, case.artefact);
         wrong.extend(coverage::check(case, &summary, 3.5));
         all.push(summary);
     }

@@ -1,0 +1,116 @@
+//! Artefacts that people own, on every control: generate → check → simulate → parse → identify → export.
+
+use crate::common::verbs::{axiscal, json, ok};
+use std::path::Path;
+
+const SCENARIO: &str = "seed = 5
+[effects.location-a]
+EY0A = 0.021
+EZ0A = -0.013
+EB0A = 0.002
+[effects.location-c]
+EX0C = 0.015
+EA0C = 0.004
+[effects.pretravel]
+pretravel = 0.004
+[[block]]
+mounting = \"MOUNTING\"
+name = \"BODY\"
+shift = [0.4, -0.3, 0.5]
+[noise]
+touch_um = 0.5
+visit_um = 0.5
+";
+
+/// Generates the program that is chosen for an artefact and runs it on a wrong machine; the study is `study.toml`.
+fn measured(at: &Path, artefact: &str, body: &str, minutes: &str, controller: &str) {
+    std::fs::write(at.join("wrong.toml"), SCENARIO.replace("MOUNTING", artefact).replace("BODY", body)).unwrap();
+    let chosen = ["--program", "auto", "--artefact", artefact, "--minutes", minutes];
+    let generate = ["generate", "--machine", "trunnion", "--controller", controller, "--out", "job"];
+    ok(at, &[&generate[..], &chosen].concat());
+    let machine = ["--machine", "trunnion", "--machines", "job/machines.toml", "--controller", controller];
+    let plan = ["--plan", "job/auto.plan.json"];
+    let program = ["ngc", "mpf", "nc", "h"].iter().find(|end| at.join(format!("job/auto.{end}")).exists()).unwrap();
+    ok(at, &[&["check", &format!("job/auto.{program}")][..], &machine, &plan].concat());
+    ok(at, &[&["simulate", "--scenario", "wrong.toml", "--out", "auto.log"][..], &machine, &plan].concat());
+    let read = ["parse", "auto.log", "--machines", "job/machines.toml", "--controller", controller];
+    assert!(ok(at, &[&read[..], &plan].concat()).contains("has its end line"));
+    ok(at, &[&["new", "--log", "auto.log", "--out", "study.toml"][..], &machine, &plan].concat());
+}
+
+/// Planted values, each within four standard uncertainties.
+fn found(at: &Path, planted: &[(&str, f64)]) {
+    let (fit, code) = json(at, &["identify", "study.toml"]);
+    assert_eq!(code, 0);
+    for (name, truth) in planted {
+        let p = fit["parameters"].as_array().unwrap().iter().find(|p| p["name"] == *name).unwrap();
+        let (value, sigma) = (p["value"].as_f64().unwrap(), p["sigma"].as_f64().unwrap());
+        assert!((value - truth).abs() < 4.0 * sigma, "{name}: {value} for {truth}, sigma {sigma}");
+    }
+}
+
+#[test]
+fn one_sphere_goes_round_on_every_control() {
+    for controller in ["linuxcnc", "sinumerik", "fanuc", "heidenhain", "haas"] {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        measured(at, "sphere", "ball", "10", controller);
+        found(
+            at,
+            &[
+                ("EY0A", 0.021),
+                ("EZ0A", -0.013),
+                ("EB0A", 0.002),
+                ("EX0C", 0.015),
+                ("EA0C", 0.004),
+                ("pretravel", 0.004),
+            ],
+        );
+        let export = ["export", "study.toml", "--controller", controller, "--accept-unverified", "--out", "tables"];
+        let out = axiscal(at, &export);
+        assert!(out.status.success(), "{controller}: {}", String::from_utf8_lossy(&out.stderr));
+        assert!(at.join("tables/README.txt").exists(), "{controller}");
+    }
+}
+
+#[test]
+fn ring_pin_and_cube_go_round() {
+    for (artefact, body) in [("ring", "ring"), ("pin", "pin"), ("cube", "cube"), ("two-spheres", "high")] {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        measured(at, artefact, body, "15", "linuxcnc");
+        // a ring that is touched with the table level sees C alone
+        let all = [("EX0C", 0.015), ("EY0A", 0.021), ("EZ0A", -0.013)];
+        found(at, &all[..if artefact == "ring" { 1 } else { 3 }]);
+    }
+}
+
+#[test]
+fn a_machine_is_a_template_and_an_artefact_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join("mine.toml"), ok(at, &["machines", "show", "trunnion", "--toml"])).unwrap();
+    std::fs::write(at.join("ball.toml"), ok(at, &["artefacts", "show", "sphere"]).replace("25.0", "30.0")).unwrap();
+    let auto = ["--program", "auto", "--artefact", "ball.toml", "--minutes", "5", "--controller", "linuxcnc"];
+    let machine = ["--machine", "trunnion", "--machines", "mine.toml", "--out", "job"];
+    ok(at, &[&["generate"][..], &auto, &machine].concat());
+    let plan: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(at.join("job/auto.plan.json")).unwrap()).unwrap();
+    assert_eq!((&plan["blocks"][0]["form"], &plan["blocks"][0]["diameter"]), (&"sphere".into(), &30.0.into()));
+    // the chosen touches are a program like any other
+    let again = ["--program", "job/auto.toml", "--controller", "linuxcnc", "--out", "again"];
+    ok(at, &[&["generate", "--machine", "trunnion", "--machines", "job/machines.toml"][..], &again].concat());
+    assert_eq!(std::fs::read(at.join("job/auto.ngc")).unwrap(), std::fs::read(at.join("again/auto.ngc")).unwrap());
+    for (words, code) in [(["--artefact", "bell"], "artefact::unknown"), (["--minutes", "0"], "auto::minutes")] {
+        let out = axiscal(
+            at,
+            &[&["generate", "--json", "--program", "auto"][..], &machine, &["--controller", "linuxcnc"], &words]
+                .concat(),
+        );
+        assert_eq!(out.status.code(), Some(2));
+        assert!(
+            String::from_utf8_lossy(&out.stderr).contains(code) || String::from_utf8_lossy(&out.stdout).contains(code),
+            "{code}"
+        );
+    }
+}
