@@ -2,7 +2,7 @@
 //! docs/discovery.md. Parts: planted (paper, full), clean (clean-paper,
 //! clean-paper-visits, clean-full, clean-full-visits), two, strange; all of them without an argument.
 //! Planted by the generator of tests/discovery on all machines: faults (faults-paper, faults-full, faults-weak), faultless
-//! (faultless-paper, faultless-full), mistakes.
+//! (faultless-paper, faultless-full), mistakes; on one sphere: faults-sphere, faultless-sphere.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a measurement that cannot be made shall stop
 #![allow(missing_docs)]
 
@@ -150,6 +150,19 @@ fn of_the_generator(part: &str, count: &dyn Fn(usize) -> usize) {
     for (name, full, seed) in [("faults-paper", false, 51), ("faults-full", true, 52)] {
         if wanted(name) {
             report_faults(name, &judge::planted(&Machines::all(full), plain, count(400), seed));
+        }
+    }
+    if wanted("faults-sphere") {
+        report_faults("one sphere, auto", &judge::planted(&Machines::one_sphere(), plain, count(200), 57));
+    }
+    if wanted("faultless-sphere") {
+        for visit_um in [0.0, 0.5] {
+            let verdicts = judge::clean(&Machines::one_sphere(), visit_um, count(500), 58);
+            let adequate = verdicts.iter().filter(|v| v.1 == "adequate").count();
+            println!(
+                "faultless-sphere, scatter {visit_um} um: not adequate {}",
+                judge::rate(verdicts.len() - adequate, verdicts.len())
+            );
         }
     }
     if wanted("faults-weak") {

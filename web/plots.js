@@ -275,6 +275,15 @@ globalThis.axiscalPlots = (() => {
     return Array.from({ length: 48 }, (_, k) => [at((k * Math.PI) / 24), at(((k + 1) * Math.PI) / 24)]);
   }
 
+  /** What is touched: a box by its edges, a sphere by three circles, a cylinder or a hole by its two ends. */
+  function bodyLines(b) {
+    const radius = (b.diameter ?? 0) / 2;
+    if (b.form === 'sphere') return [[1, 0, 0], [0, 1, 0], [0, 0, 1]].flatMap((d) => ring(b.centre, d, radius));
+    if (b.form !== 'cylinder' && b.form !== 'bore') return boxLines(b.centre, b.size);
+    const ends = [-0.5, 0.5].flatMap((k) => ring(sum(b.centre, [0, 0, 1], k * b.size[2]), [0, 0, 1], radius));
+    return b.form === 'bore' ? [...ends, ...boxLines(b.centre, b.size)] : ends;
+  }
+
   /** 1, 2 or 5 times a power of ten, not above x. */
   function round125(x) {
     const power = 10 ** Math.floor(Math.log10(x));
@@ -312,7 +321,7 @@ globalThis.axiscalPlots = (() => {
       return { name: t.words[stage], shafts, tips, which };
     });
     const rejected = t.rejected.flatMap((r, i) => (r === null ? [] : [i]));
-    const blocks = m.blocks.flatMap((b) => boxLines(b.centre, b.size));
+    const blocks = m.blocks.flatMap(bodyLines);
     const table = m.solids.flatMap((s) => {
       if (!s.radius_height) return boxLines(s.at, s.size);
       const end = sum(s.at, s.direction, s.radius_height[1]);

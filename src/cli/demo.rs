@@ -22,7 +22,7 @@ const SCENARIO: &str = include_str!("demo_wrong.toml");
 
 /// Files of an earlier demo: written anew, where the folder is one of the demo.
 const WRITTEN: [&str; 8] = [
-    "full.log",
+    "auto.log",
     "study.toml",
     "study.history.json",
     "check-before.log",
@@ -35,16 +35,16 @@ const WRITTEN: [&str; 8] = [
 /// A step: what it is for, and the call; `OUT/` stands for the folder.
 const STEPS: [(&str, &str); 17] = [
     (
-        "a probing program for LinuxCNC: every move checked for limits and collisions",
-        "generate --machine swivel-head --program full --controller linuxcnc --out OUT",
+        "one calibration sphere on a trunnion: a probing program for LinuxCNC, chosen and checked for limits and collisions",
+        "generate --machine trunnion --program auto --artefact sphere --minutes 20 --controller linuxcnc --out OUT",
     ),
     (
         "the virtual machine runs it with hidden errors and writes the control's log",
-        "simulate --plan OUT/full.plan.json --machine swivel-head --scenario OUT/wrong.toml --controller linuxcnc --out OUT/full.log",
+        "simulate --plan OUT/auto.plan.json --machine trunnion --machines OUT/machines.toml --scenario OUT/wrong.toml --controller linuxcnc --out OUT/auto.log",
     ),
     (
         "a study: what was measured, and the effects of the model",
-        "new --machine swivel-head --plan OUT/full.plan.json --log OUT/full.log --controller linuxcnc --out OUT/study.toml",
+        "new --machine trunnion --machines OUT/machines.toml --plan OUT/auto.plan.json --log OUT/auto.log --controller linuxcnc --out OUT/study.toml",
     ),
     ("the machine's errors with their uncertainty: the model does not fit yet", "identify OUT/study.toml"),
     ("where does it fail?", "compare OUT/study.toml"),
@@ -59,23 +59,23 @@ const STEPS: [(&str, &str); 17] = [
     ),
     (
         "does it work? other points, before ...",
-        "generate --machine swivel-head --program OUT/check.toml --controller linuxcnc --out OUT",
+        "generate --machine trunnion --machines OUT/machines.toml --program OUT/check.toml --controller linuxcnc --out OUT",
     ),
     (
         "... without the compensation",
-        "simulate --plan OUT/check.plan.json --machine swivel-head --scenario OUT/wrong.toml --controller linuxcnc --out OUT/check-before.log",
+        "simulate --plan OUT/check.plan.json --machine trunnion --machines OUT/machines.toml --scenario OUT/wrong.toml --controller linuxcnc --out OUT/check-before.log",
     ),
     (
         "... and with it",
-        "simulate --plan OUT/check.plan.json --machine swivel-head --scenario OUT/wrong.toml --controller linuxcnc --compensation OUT/compensation --out OUT/check-after.log",
+        "simulate --plan OUT/check.plan.json --machine trunnion --machines OUT/machines.toml --scenario OUT/wrong.toml --controller linuxcnc --compensation OUT/compensation --out OUT/check-after.log",
     ),
     (
         "one study for each",
-        "new --machine swivel-head --plan OUT/check.plan.json --log OUT/check-before.log --controller linuxcnc --out OUT/check-before.toml",
+        "new --machine trunnion --machines OUT/machines.toml --plan OUT/check.plan.json --log OUT/check-before.log --controller linuxcnc --out OUT/check-before.toml",
     ),
     (
         "(the control says which compensation was active)",
-        "new --machine swivel-head --plan OUT/check.plan.json --log OUT/check-after.log --controller linuxcnc --compensation OUT/compensation --out OUT/check-after.toml",
+        "new --machine trunnion --machines OUT/machines.toml --plan OUT/check.plan.json --log OUT/check-after.log --controller linuxcnc --compensation OUT/compensation --out OUT/check-after.toml",
     ),
     ("before and after, side by side", "verify OUT/check-before.toml OUT/check-after.toml"),
 ];
@@ -118,8 +118,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     ));
     io.say("Where to look:");
     for (file, what) in [
-        ("full.ngc", "the program: its head says what to set up where, and when it stops for the operator"),
-        ("full.log", "what LinuxCNC would have written"),
+        ("auto.ngc", "the program: its head says where to put the sphere, and how to stop"),
+        ("auto.log", "what LinuxCNC would have written"),
         ("wrong.toml", "what was wrong with the machine"),
         ("study.toml", "the study, with the effects that were added"),
         ("report.html", "all of it as one page: open it in a browser"),

@@ -2,9 +2,10 @@
 
 use super::chart::{Axis, Chart, Colour, Look, Mark, Point, Shape, field};
 use super::charts::{BLUE, GREEN, GREY, INK, ORANGE, PURPLE, RED};
+use crate::machine::Form;
 use crate::report::fit::significant;
 use crate::view::View;
-use crate::view::record::SolidRecord;
+use crate::view::record::{BlockRecord, SolidRecord};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
@@ -42,16 +43,33 @@ fn edges(centre: V, size: V) -> Vec<(V, V)> {
     pairs.map(|(a, b)| (corner(a), corner(b))).collect()
 }
 
+/// What is touched: a box by its edges, a sphere by three circles, a cylinder or a hole by its two ends.
+fn body(b: &BlockRecord) -> Vec<(V, V)> {
+    let (centre, size) = (V::from(b.centre), V::from(b.size));
+    let radius = b.diameter.unwrap_or_default() / 2.0;
+    let ends = || circles(centre - V::z() * (size.z / 2.0), V::z(), radius, &[0.0, size.z]);
+    match b.form {
+        Form::Box | Form::Plane => edges(centre, size),
+        Form::Sphere => [V::x(), V::y(), V::z()].iter().flat_map(|d| circles(centre, *d, radius, &[0.0])).collect(),
+        Form::Cylinder => ends(),
+        Form::Bore => ends().into_iter().chain(edges(centre, size)).collect(),
+    }
+}
+
 fn rings(s: &SolidRecord, direction: V, radius: f64, height: f64) -> Vec<(V, V)> {
+    circles(V::from(s.at), direction, radius, &[0.0, height])
+}
+
+/// Circles about a line through a point, at these places along it.
+fn circles(foot: V, direction: V, radius: f64, along: &[f64]) -> Vec<(V, V)> {
     let other = if direction.z.abs() < 0.9 { V::z() } else { V::x() };
     let u = direction.cross(&other).normalize();
     let w = direction.cross(&u);
-    let foot = V::from(s.at);
     let at = |k: usize, z: f64| {
         let (sin, cos) = (TAU * k as f64 / 48.0).sin_cos();
         foot + direction * z + (u * cos + w * sin) * radius
     };
-    [0.0, height].iter().flat_map(|z| (0..48).map(|k| (at(k, *z), at(k + 1, *z))).collect::<Vec<_>>()).collect()
+    along.iter().flat_map(|z| (0..48).map(|k| (at(k, *z), at(k + 1, *z))).collect::<Vec<_>>()).collect()
 }
 
 /// 1, 2 or 5 times a power of ten, not above x.
@@ -92,7 +110,7 @@ pub(super) fn machine(view: &View) -> Chart {
         marks.push(line("", GREY, 1, None, &lines));
     }
     for b in &view.machine.blocks {
-        marks.push(line("", INK, 2, None, &edges(V::from(b.centre), V::from(b.size))));
+        marks.push(line("", INK, 2, None, &body(b)));
     }
     for a in &view.machine.axes {
         let direction = V::from(a.direction);

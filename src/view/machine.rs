@@ -41,8 +41,10 @@ pub(super) fn machine(m: &Material) -> MachineRecord {
                 blocks.push(BlockRecord {
                     name: b.name.clone(),
                     carrier: b.carrier.clone(),
+                    form: b.form,
                     centre: b.centre,
                     size: b.size,
+                    diameter: b.diameter,
                     run: run + 1,
                 });
             }

@@ -9,6 +9,7 @@ use crate::compare::Split;
 use crate::compare::model_ladder::{Curve, Kind};
 use crate::diagnose::Diagnosis;
 use crate::fit::outcome::{Combination, Status, Undetermined};
+use crate::machine::Form;
 use crate::study::tolerance::Tolerance;
 use crate::tables::compensation::Term;
 use serde::Serialize;
@@ -325,9 +326,15 @@ pub struct BlockRecord {
     pub name: String,
     /// What bears it.
     pub carrier: String,
+    /// What it is; without it a box.
+    #[serde(skip_serializing_if = "Form::is_box")]
+    pub form: Form,
     pub centre: [f64; 3],
-    /// Its full edges.
+    /// Full edges of the box that holds it.
     pub size: [f64; 3],
+    /// Of a sphere, a cylinder or a hole.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub diameter: Option<f64>,
     /// Number of the run, from 1.
     pub run: usize,
 }

@@ -87,6 +87,14 @@ impl Bench {
         Self { name: format!("{name} {}", if full { "full" } else { "paper" }), machine, runs }
     }
 
+    /// The commonest machine with the commonest artefact, and the program of twenty minutes that is chosen for it.
+    pub fn one_sphere() -> Vec<Self> {
+        let (machine, auto) = crate::common::with_artefact("trunnion", "sphere", 20.0);
+        let (made, _) =
+            axiscal::program::generate(&machine, &auto.spec, &axiscal::program::Options::default()).unwrap();
+        vec![Self { name: "trunnion sphere".to_owned(), machine, runs: vec![(made.plan, 0.0)] }]
+    }
+
     pub fn hours(&self) -> f64 {
         let (plan, began) = self.runs.last().unwrap();
         (began + plan.touches.last().unwrap().time_s.unwrap()) / 3600.0
@@ -99,7 +107,9 @@ impl Bench {
     /// The model that a user begins with.
     pub fn base_model(&self) -> Vec<String> {
         let locations = self.rotary().into_iter().map(|a| format!("location-{}", a.letter().to_ascii_lowercase()));
-        locations.chain(["block-setup".to_owned(), "pretravel".to_owned()]).collect()
+        let spheres = self.runs[0].0.blocks.iter().all(|b| b.diameter.is_some());
+        let stands = if spheres { "sphere-setup" } else { "block-setup" };
+        locations.chain([stands.to_owned(), "pretravel".to_owned()]).collect()
     }
 
     /// The logs of all runs on a machine with `acts`, matched to the plans. `touch_um`, `visit_um`: scatter of a touch and of the ball
@@ -227,6 +237,7 @@ impl Bench {
             centre,
             point,
             normal: outward_normal,
+            sphere_radius: planned.diameter.map(|d| d / 2.0),
             ball_radius: touch.ball_radius_mm.unwrap_or(plan.ball_radius_mm),
             stylus_mm,
             spindle_rad,

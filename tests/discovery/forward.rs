@@ -76,6 +76,8 @@ pub struct Target {
     /// Where the ball should touch, and the outward normal, in the carrier's frame.
     pub point: V,
     pub normal: V,
+    /// Of a sphere about `centre`; `None`: a face.
+    pub sphere_radius: Option<f64>,
     pub ball_radius: f64,
     pub stylus_mm: f64,
     pub spindle_rad: f64,
@@ -147,6 +149,9 @@ fn ball_in_carrier(machine: &Machine, q: &[f64; 6], wrong: &Wrong, target: &Targ
 fn gap(machine: &Machine, q: &[f64; 6], wrong: &Wrong, target: &Target) -> f64 {
     let in_carrier = ball_in_carrier(machine, q, wrong, target);
     let in_block = turned(wrong.block_turn).transpose() * (in_carrier - target.centre - wrong.block_shift);
+    if let Some(radius) = target.sphere_radius {
+        return in_block.norm() - radius - target.ball_radius;
+    }
     let face = target.point - target.centre;
     target.normal.dot(&(in_block - face)) - 0.5 * wrong.longer.dot(&target.normal.abs()) - target.ball_radius
 }
@@ -160,13 +165,14 @@ pub fn trigger(machine: &Machine, start: &[f64; 6], way: V, wrong: &Wrong, targe
     };
     // with nothing that changes on the way the gap is straight in it: the secant is exact, the second step mends rounding
     let (mut a, mut b) = (0.0, 1.0);
-    for _ in 0..3 {
+    let (rounds, window) = if target.sphere_radius.is_some() { (8, 0.02) } else { (3, 0.5) };
+    for _ in 0..rounds {
         let (ga, gb) = (gap(machine, &at(a), wrong, target), gap(machine, &at(b), wrong, target));
         if (gb - ga).abs() < 1e-12 {
             break;
         }
         let next = b - gb * (b - a) / (gb - ga);
-        (a, b) = (next - 0.5, next);
+        (a, b) = (next - window, next);
     }
     at(b + wrong.late)
 }
