@@ -24,12 +24,17 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
         ),
     ];
     lines.extend(parts_lines(layout));
+    let all = || layout.parts.iter().flat_map(|p| &p.mounting.blocks);
+    let faces = all().any(|b| matches!(b.form, Form::Box | Form::Plane));
+    let body = if all().all(|b| b.form == Form::Box) { "block" } else { "body" };
+    let tolerance = probe.placement_tolerance;
     lines.extend([
-        format!(
-            "  each block within {} mm of its place, its faces along the machine's axes",
-            probe.placement_tolerance
-        ),
-        "  a touch that is further off stops the program; the first of each block is made slowly".to_owned(),
+        if faces {
+            format!("  each block within {tolerance} mm of its place, its faces along the machine's axes")
+        } else {
+            format!("  what is touched within {tolerance} mm of its place")
+        },
+        format!("  a touch that is further off stops the program; the first of each {body} is made slowly"),
         "  the positions above and below are machine coordinates with all rotary axes at 0, ball's centre".to_owned(),
         "Before the start:".to_owned(),
         "  probe in the spindle, spindle stopped, nothing that touches the stylus".to_owned(),
@@ -145,7 +150,8 @@ fn block_lines(machine: &Machine, block: &Block) -> Vec<String> {
         Form::Bore => format!("  bore {}: {across} mm across, in a body of {edges}", block.name),
     };
     if let Some(riser) = &block.riser {
-        line.push_str(&format!(", on a riser {} mm high", riser.height));
+        let what = if riser.diameter.is_some() { "stem" } else { "riser" };
+        line.push_str(&format!(", on a {what} {} mm high", riser.height));
         if let Some(toward) = riser.toward.filter(|t| *t != Toward::MinusZ) {
             line.push_str(&format!(", which goes to {}", toward.as_str()));
         }
