@@ -120,6 +120,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         io.say(format!("{} goes to the control with the program: {}", file.display(), beside.says));
     }
     io.say("the head of the program says what to set up where");
+    if let Some(better) = auto.as_ref().and_then(|a| a.better.as_ref()) {
+        io.report(&[crate::words::generate::badly_placed(better)]);
+    }
     if auto.is_some() {
         io.say(format!("{AUTO}.toml holds the chosen touches: it can be edited and used with --program FILE"));
     }

@@ -23,12 +23,14 @@ const MOST_AGAIN: usize = 3;
 const WIDE: f64 = 30.0;
 
 /// What was chosen from a pool.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
     /// Bundles, in the order in which they were taken.
     pub chosen: Vec<usize>,
     /// Those of them that come once more at the end.
     pub again: Vec<usize>,
+    /// Standard uncertainty of the worst-determined result, in its typical size.
+    pub worst: f64,
 }
 
 /// Chooses bundles within a time, s. `view`: the touches of the pool, one after the other.
@@ -58,7 +60,8 @@ pub fn choose(view: &LinearisedPlan, pool: &[Bundle], budget_s: f64) -> Choice {
             again.push(v);
         }
     }
-    Choice { chosen: visits.members(&chosen), again: visits.members(&again) }
+    let worst = results.iter().map(|&c| of_all.covariance[(c, c)].max(0.0).sqrt()).fold(0.0, f64::max);
+    Choice { chosen: visits.members(&chosen), again: visits.members(&again), worst }
 }
 
 /// Bundles in one manner, which follow one another in a pool: the rotary axes go there once for all of them.

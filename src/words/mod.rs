@@ -2,4 +2,5 @@
 
 pub(crate) mod diagnose;
 pub(crate) mod fit;
+pub(crate) mod generate;
 pub(crate) mod log;

@@ -10,12 +10,23 @@ use crate::machine::{Machine, Mounting};
 use crate::model::catalogue::Catalogue;
 use crate::program::{self, Generated, Options, ProgramSpec};
 use crate::units::mm_from_um;
+use nalgebra::Vector3;
 
 /// Rounds of choosing, proving and leaving out what cannot be reached.
 const MOST_ROUNDS: usize = 6;
 
 /// The program uses at least this share of its time, at most this much more.
 const USED: [f64; 2] = [0.9, 1.02];
+
+/// A result that is known no better than to this part of its typical size is one that the artefact hardly sees.
+const POOR: f64 = 1.0;
+
+/// Another place is worth the trouble when the worst uncertainty is so many times smaller there.
+const WORTH_MOVING: f64 = 1.5;
+
+/// Places that are tried: X and Y from the axis of what bears the artefact, and how much higher, mm.
+const PLACES_MM: [(f64, f64, f64); 6] =
+    [(60.0, 0.0, 0.0), (-60.0, 0.0, 0.0), (0.0, 60.0, 0.0), (0.0, -60.0, 0.0), (100.0, 0.0, 0.0), (60.0, 0.0, 50.0)];
 
 /// Longest program, minutes: a day.
 const MOST_MINUTES: f64 = 1440.0;
@@ -26,6 +37,19 @@ pub struct AutoProgram {
     /// The file's text: it can be edited and used like any other.
     pub text: String,
     pub spec: ProgramSpec,
+    /// A place at which the artefact would see much more.
+    pub better: Option<BetterPlace>,
+}
+
+/// Another place for an artefact.
+#[derive(Debug, Clone, PartialEq)]
+pub struct BetterPlace {
+    /// By how much all bodies would move, mm in R.
+    pub by_mm: Vector3<f64>,
+    /// How many times smaller the worst uncertainty would be.
+    pub times: f64,
+    /// Standard uncertainty of the worst-determined result where it stands, in its typical size.
+    pub worst: f64,
 }
 
 /// Chooses poses and touches for what a mounting holds, within a time.
@@ -51,6 +75,7 @@ pub fn auto_program(
     let mut pool = bundles(machine, mounting);
     let mut scale = 1.0;
     let mut best: Option<(f64, String)> = None;
+    let mut worst = f64::INFINITY;
     let mut why: Option<Failure> = None;
     for _ in 0..MOST_ROUNDS {
         if pool.is_empty() {
@@ -60,6 +85,7 @@ pub fn auto_program(
         if choice.chosen.is_empty() {
             break;
         }
+        worst = worst.min(choice.worst);
         let mut text = write(&pool, &choice);
         let made = match prove(machine, &text) {
             Ok(made) => made,
@@ -80,7 +106,8 @@ pub fn auto_program(
                 let same = |i: &usize| left.iter().position(|b| b.is_of(&pool[*i]));
                 of.iter().filter_map(same).collect()
             };
-            text = write(&left, &Choice { chosen: again(&choice.chosen), again: again(&choice.again) });
+            let kept = Choice { chosen: again(&choice.chosen), again: again(&choice.again), worst: choice.worst };
+            text = write(&left, &kept);
             pool = left;
         }
         let worth = used - 2.0 * lost;
@@ -103,7 +130,37 @@ pub fn auto_program(
     };
     let (_, text) = best.ok_or_else(nothing)?;
     let (spec, _) = program::load(&source("auto.toml", text.clone()))?;
-    Ok(AutoProgram { text, spec })
+    let better = if worst > POOR { better_place(machine, catalogue, mounting, budget_s, worst)? } else { None };
+    Ok(AutoProgram { text, spec, better })
+}
+
+/// Looks at the places round the axis of what bears an artefact, and higher up: with the touches alone, not proven.
+fn better_place(
+    machine: &Machine,
+    catalogue: &Catalogue,
+    mounting: &Mounting,
+    budget_s: f64,
+    worst: f64,
+) -> Result<Option<BetterPlace>> {
+    let Some(first) = mounting.blocks.first() else { return Ok(None) };
+    let turning = machine.carrier_chain(first.carrier).last().copied().filter(|a| a.name.is_rotary());
+    let foot = turning.map_or(machine.reference.table, |axis| axis.point);
+    let mut best: Option<BetterPlace> = None;
+    for (x, y, up) in PLACES_MM {
+        let by_mm = Vector3::new(foot.x + x - first.centre.x, foot.y + y - first.centre.y, up);
+        let mut moved = mounting.clone();
+        moved.blocks.iter_mut().for_each(|b| b.centre += by_mm);
+        let pool = bundles(machine, &moved);
+        if pool.is_empty() {
+            continue;
+        }
+        let there = choose(&linearised(machine, catalogue, &moved, &pool, budget_s)?, &pool, budget_s).worst;
+        let times = worst / there;
+        if times > best.as_ref().map_or(WORTH_MOVING, |b| b.times) {
+            best = Some(BetterPlace { by_mm, times, worst });
+        }
+    }
+    Ok(best)
 }
 
 fn prove(machine: &Machine, text: &str) -> Result<Generated> {
