@@ -15,9 +15,7 @@
       if (name.startsWith('on')) el.addEventListener(name.slice(2), value);
       else if (value !== null && value !== undefined && value !== false) el.setAttribute(name, value === true ? '' : value);
     }
-    // the rooms write um in plain letters
-    const micro = (c) => (typeof c === 'string' && tag !== 'code' ? c.replace(/(^|\d )um\b/g, '$1µm') : c);
-    el.append(...children.filter((c) => c !== null && c !== undefined).map(micro));
+    el.append(...children.filter((c) => c !== null && c !== undefined));
     return el;
   }
 

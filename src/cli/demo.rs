@@ -108,8 +108,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         (readings(&args.out, "before", &inner)?, readings(&args.out, "after", &inner)?);
     let out = args.out.display();
     io.say(format!(
-        "\n=== what the demo has shown\nThe model missed the touches by {} um RMS, and by {} um with what was found missing; the noise is {} um.\n\
-         At other points the machine was off by {} um RMS before, and by {} um with its compensation.\n",
+        "\n=== what the demo has shown\nThe model missed the touches by {} µm RMS, and by {} µm with what was found missing; the noise is {} µm.\n\
+         At other points the machine was off by {} µm RMS before, and by {} µm with its compensation.\n",
         significant(before.outcome.rms_um),
         significant(after.outcome.rms_um),
         significant(after.outcome.noise_um),

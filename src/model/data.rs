@@ -10,7 +10,7 @@ use crate::log::{Status, Supposed, Touch, suppose};
 use crate::machine::{Carrier, Machine};
 use crate::program::plan::{Numbered, Plan, PlanBlock, PlanTouch};
 use crate::units::{hours_from_s, rad_from_deg, s_from_h};
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 
 /// One measurement run.
 #[derive(Debug, Clone)]
@@ -147,6 +147,7 @@ pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[Spindle
         let mut last_sense = [0.0; 6];
         let mut before = Before::default();
         let mut way = WaySinceReversal::default();
+        let mut turned = LastTurned::default();
         visits.last = None;
         let logged = run.touches.iter().filter(|t| t.position.0.iter().all(|v| v.is_finite()));
         let of_log = run.touches.iter().find_map(|t| t.digit_mm);
@@ -216,7 +217,8 @@ pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[Spindle
             let ideal =
                 machine.linear_for_ball(carrier, &planned.pose.position(), &ball, length_mm).unwrap_or(touch.position);
             // the rotary axes stand where the control says they stand; a log without them means the plan's pose
-            let at = |position: Position| Observation {
+            let turned = &mut turned;
+            let mut at = |position: Position| Observation {
                 run: index,
                 id: touch.id,
                 set_up,
@@ -228,6 +230,7 @@ pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[Spindle
                 position,
                 has_temperature: temperature_deg_c.is_some(),
                 state: Circumstances {
+                    turned: turned.of(machine, carrier, &position),
                     machine,
                     carrier,
                     block,
@@ -395,8 +398,37 @@ impl WaySinceReversal {
     }
 }
 
+/// How tool and carrier are turned in a pose.
+#[derive(Debug, Clone, Copy)]
+struct Turned {
+    tool: UnitQuaternion<f64>,
+    carrier: UnitQuaternion<f64>,
+}
+
+/// The same of the last pose: touches of a pose follow one another.
+#[derive(Debug, Default)]
+struct LastTurned(Option<(Carrier, [u64; 3], Turned)>);
+
+impl LastTurned {
+    fn of(&mut self, machine: &Machine, carrier: Carrier, at: &Position) -> Turned {
+        let pose = [3, 4, 5].map(|i| at.0[i].to_bits());
+        match &self.0 {
+            Some((of, known, turned)) if *of == carrier && *known == pose => *turned,
+            _ => {
+                let turned = Turned {
+                    tool: machine.tool_frame(at).rotation,
+                    carrier: machine.carrier_frame(carrier, at).rotation,
+                };
+                self.0 = Some((carrier, pose, turned));
+                turned
+            }
+        }
+    }
+}
+
 /// What the state of a touch is made of.
 struct Circumstances<'a> {
+    turned: Turned,
     machine: &'a Machine,
     carrier: Carrier,
     block: &'a PlanBlock,
@@ -436,13 +468,13 @@ impl Circumstances<'_> {
         const ROUNDING: f64 = 1e-12;
         let plain = |v: Vector3<f64>| v.map(|x| if x.abs() <= ROUNDING { 0.0 } else { x });
         let normal = Vector3::from(c.planned.normal).normalize();
-        let into_tool = c.machine.tool_frame(c.at).rotation.inverse();
-        let in_r = c.machine.carrier_frame(c.carrier, c.at).rotation * normal;
+        let into_tool = c.turned.tool.inverse();
+        let in_r = c.turned.carrier * normal;
         let into_probe = nalgebra::Rotation3::from_axis_angle(&c.machine.tool.direction, -spindle);
         put(slot::NORMAL_IN_R, plain(in_r));
         put(slot::NORMAL_IN_PROBE, plain(into_probe * (into_tool * in_r)));
         put(slot::GRAVITY, plain(into_tool * -Vector3::z()));
-        put(slot::GRAVITY_AT_BLOCK, plain(c.machine.carrier_frame(c.carrier, c.at).rotation.inverse() * -Vector3::z()));
+        put(slot::GRAVITY_AT_BLOCK, plain(c.turned.carrier.inverse() * -Vector3::z()));
         put(slot::NORMAL_OF_BLOCK, normal);
         put(slot::POINT, c.planned.point.into());
         put(slot::OUTWARD, plain(outward(c.machine, c.carrier, &c.block.centre.into())));

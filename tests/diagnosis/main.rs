@@ -17,5 +17,6 @@ mod next_steps;
 mod plan_next;
 mod plan_sweep;
 mod solve;
+mod sphere;
 mod story;
 mod telescope;

@@ -47,7 +47,6 @@ function verdict() {
   const soFar = noise === null ? "There are as many unknowns as touches: the model cannot be judged."
     : noise ? "The residual is as small as the noise. Searching for a pattern in it …"
     : `The residuals are ${ratio} times the noise. Searching for the missing effect …`;
-  // the rooms write um in plain letters
   const first = found?.candidates[0];
   // several effects would do, and no touches are left over to try one of them on
   const untried = (c) => c.p_adjusted < 0.05 && !(c.held_out_before_um > 0 || c.held_out_after_um > 0);
@@ -55,7 +54,7 @@ function verdict() {
     ? new Set(found.candidates.filter(untried).flatMap((c) => [c.effect, ...c.same_as])) : new Set();
   const which = open.size > 1 ? `one of ${open.size} known effects explains it; these poses cannot decide which.` : `one known effect explains it (${first?.name}); these poses cannot confirm it.`;
   const says = open.size ? `An effect is missing in the model (${found.rms_um.toFixed(2)} µm RMS against ${found.noise_um.toFixed(2)} µm noise): ${which}` : found?.says;
-  show("verdict", says?.replace(/(\d )um\b/g, "$1µm") ?? soFar);
+  show("verdict", says ?? soFar);
   show("advice", !found ? "" : found.verdict === "missing-effect" && first
     ? `Open ${first.name} in the list, look at its curve over the touches, and switch it on if it is what the machine shows.${first.same_as.length ? ` It cannot be separated from ${[...first.same_as, ...(first.or_else ? [first.or_else] : [])].join(", ")}: a further program can.` : ""}`
     : found.faint ? "The residual is as small as the noise, except for a weak pattern: write the program that shows whether it is real."

@@ -1,0 +1,82 @@
+//! One calibration sphere: what its touches can be taken for.
+
+use crate::common::verbs::{json, ok};
+use std::path::Path;
+
+const PROGRAM: &str = "format = \"axiscal-programs/1\"
+name = \"four\"
+machine = \"trunnion\"
+says = \"the pole and four touches on the equator\"
+mounting = \"sphere\"
+repeats = 2
+
+[[ring]]
+name = \"pole\"
+directions_in = \"tool\"
+azimuth_deg = [0]
+elevation_deg = [90]
+
+[[ring]]
+name = \"equator\"
+directions_in = \"tool\"
+azimuth_deg = [AZIMUTHS]
+elevation_deg = [12]
+
+[[stage]]
+name = \"all\"
+
+[[stage.setup]]
+pose = { A = [-60.0, -25.0, 0.0, 40.0, 70.0], C = [0.0, 50.0, 110.0, 190.0, 250.0, 300.0] }
+touch = [{ ring = \"pole\" }, { ring = \"equator\" }]
+";
+
+/// The study of a program on a probe with three lobes.
+fn lobed(at: &Path, azimuths: &str) {
+    std::fs::write(at.join("four.toml"), PROGRAM.replace("AZIMUTHS", azimuths)).unwrap();
+    let wrong = "seed = 3\n[effects.location-a]\nEY0A = 0.02\n[effects.lobing-3]\nlobing3c = 3.0\n[noise]\ntouch_um = 0.5\nvisit_um = 0.3\n";
+    std::fs::write(at.join("wrong.toml"), wrong).unwrap();
+    let machine = ["--machine", "trunnion", "--controller", "linuxcnc"];
+    ok(at, &[&["generate", "--program", "four.toml", "--artefact", "sphere", "--out", "."][..], &machine].concat());
+    let plan = ["--machines", "machines.toml", "--plan", "four.plan.json"];
+    ok(at, &[&["simulate", "--scenario", "wrong.toml", "--out", "four.log"][..], &machine, &plan].concat());
+    ok(at, &[&["new", "--log", "four.log", "--out", "study.toml"][..], &machine, &plan].concat());
+}
+
+/// Four touches take the three lobes for a place of the ball in the spindle: it is no error of the machine, and none is proposed.
+#[test]
+fn a_lobed_probe_is_not_called_an_error_of_the_machine() {
+    for azimuths in ["0, 90, 180, 270", "0, 72, 144, 216, 288"] {
+        let folder = tempfile::tempdir().unwrap();
+        lobed(folder.path(), azimuths);
+        let (said, _) = json(folder.path(), &["diagnose", "study.toml"]);
+        let proposed: Vec<&serde_json::Value> =
+            said["candidates"].as_array().unwrap().iter().filter(|c| c["proposed"] == true).collect();
+        for c in &proposed {
+            let group = format!("{} {}", c["effect"], c["same_as"]);
+            assert!(group.contains("lobing-3"), "{azimuths}: {group}");
+        }
+        // five touches see the lobes, and say so
+        assert_eq!(proposed.is_empty(), azimuths.starts_with("0, 90"), "{azimuths}: {}", said["says"]);
+    }
+}
+
+/// What is left of a touch is the sum of two radii: the diagnosis does not name one of the two, and `artefact-diameter` in place of
+/// `pretravel` fits as well.
+#[test]
+fn radius_and_tip_are_one_number() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    lobed(at, "0, 72, 144, 216, 288");
+    let study = std::fs::read_to_string(at.join("study.toml")).unwrap();
+    assert!(study.contains("\"pretravel\""));
+    let (with_tip, _) = json(at, &["identify", "study.toml"]);
+    std::fs::write(at.join("study.toml"), study.replace("\"pretravel\"", "\"artefact-diameter\"")).unwrap();
+    let (with_sphere, _) = json(at, &["identify", "study.toml"]);
+    let rms = |fit: &serde_json::Value| fit["rms_um"].as_f64().unwrap();
+    assert!((rms(&with_tip) - rms(&with_sphere)).abs() < 0.01, "{} {}", rms(&with_tip), rms(&with_sphere));
+    // both at once: one combination without effect, and it names the two
+    std::fs::write(at.join("study.toml"), study.replace("\"pretravel\"", "\"pretravel\", \"artefact-diameter\"")).unwrap();
+    let (both, _) = json(at, &["identify", "study.toml"]);
+    let says = both["undetermined"].to_string();
+    assert!(says.contains("pretravel") && says.contains("diameter"), "{says}");
+}
