@@ -2,7 +2,8 @@
 //!
 //! What a word, a variable or a G number *means* is not here: that is the dialect's (`run::Dialect`).
 
-use std::collections::HashMap;
+use super::run::Fault;
+use std::collections::{BTreeMap, HashMap};
 use std::hash::{BuildHasherDefault, Hasher};
 use std::ops::Range;
 use std::sync::{Arc, LazyLock};
@@ -269,6 +270,53 @@ impl Code {
     pub fn push(&mut self, at: Range<usize>, what: Instruction) -> usize {
         self.statements.push(Statement { at, what });
         self.statements.len() - 1
+    }
+}
+
+/// Labels and what leads to them, which may stand before them.
+#[derive(Debug)]
+pub struct Links<K> {
+    places: BTreeMap<K, usize>,
+    jumps: Vec<(usize, K, Range<usize>)>,
+}
+
+impl<K> Default for Links<K> {
+    fn default() -> Self {
+        Self { places: BTreeMap::new(), jumps: Vec::new() }
+    }
+}
+
+impl<K: Ord> Links<K> {
+    /// A label stands before the statement that comes next; `false`: it stands twice.
+    pub fn label(&mut self, label: K, code: &Code) -> bool {
+        self.places.insert(label, code.statements.len()).is_none()
+    }
+
+    pub fn has(&self, label: &K) -> bool {
+        self.places.contains_key(label)
+    }
+
+    /// A statement leads to a label.
+    pub fn leads(&mut self, statement: usize, label: K, at: Range<usize>) {
+        self.jumps.push((statement, label, at));
+    }
+
+    /// Lets all of them lead there. `lacks` is told of labels that stand nowhere.
+    ///
+    /// # Errors
+    /// Those of `lacks`.
+    pub fn resolve(
+        self,
+        code: &mut Code,
+        mut lacks: impl FnMut(&mut Code, K, Range<usize>) -> Result<(), Fault>,
+    ) -> Result<(), Fault> {
+        for (statement, label, at) in self.jumps {
+            match self.places.get(&label) {
+                Some(to) => code.aim(statement, *to),
+                None => lacks(code, label, at)?,
+            }
+        }
+        Ok(())
     }
 }
 
