@@ -2,7 +2,8 @@
 //!
 //! What a word, a variable or a G number *means* is not here: that is the dialect's (`run::Dialect`).
 
-use std::collections::HashMap;
+use super::run::Fault;
+use std::collections::{BTreeMap, HashMap};
 use std::hash::{BuildHasherDefault, Hasher};
 use std::ops::Range;
 use std::sync::{Arc, LazyLock};
@@ -272,6 +273,53 @@ impl Code {
     }
 }
 
+/// Labels and what leads to them, which may stand before them.
+#[derive(Debug)]
+pub struct Links<K> {
+    places: BTreeMap<K, usize>,
+    jumps: Vec<(usize, K, Range<usize>)>,
+}
+
+impl<K> Default for Links<K> {
+    fn default() -> Self {
+        Self { places: BTreeMap::new(), jumps: Vec::new() }
+    }
+}
+
+impl<K: Ord> Links<K> {
+    /// A label stands before the statement that comes next; `false`: it stands twice.
+    pub fn label(&mut self, label: K, code: &Code) -> bool {
+        self.places.insert(label, code.statements.len()).is_none()
+    }
+
+    pub fn has(&self, label: &K) -> bool {
+        self.places.contains_key(label)
+    }
+
+    /// A statement leads to a label.
+    pub fn leads(&mut self, statement: usize, label: K, at: Range<usize>) {
+        self.jumps.push((statement, label, at));
+    }
+
+    /// Lets all of them lead there. `lacks` is told of labels that stand nowhere.
+    ///
+    /// # Errors
+    /// Those of `lacks`.
+    pub fn resolve(
+        self,
+        code: &mut Code,
+        mut lacks: impl FnMut(&mut Code, K, Range<usize>) -> Result<(), Fault>,
+    ) -> Result<(), Fault> {
+        for (statement, label, at) in self.jumps {
+            match self.places.get(&label) {
+                Some(to) => code.aim(statement, *to),
+                None => lacks(code, label, at)?,
+            }
+        }
+        Ok(())
+    }
+}
+
 /// Variables and their values.
 pub type Values = HashMap<Var, f64, BuildHasherDefault<VarHasher>>;
 
@@ -295,6 +343,12 @@ impl Hasher for VarHasher {
     }
 
     fn write(&mut self, bytes: &[u8]) {
+        // the ends of a longer name tell it from others of the program
+        if let (Some(first), Some(last)) = (bytes.first_chunk::<8>(), bytes.last_chunk::<8>()) {
+            self.mix(u64::from_le_bytes(*first));
+            self.mix(u64::from_le_bytes(*last) ^ bytes.len() as u64);
+            return;
+        }
         for chunk in bytes.chunks(8) {
             let mut word = [0; 8];
             word.iter_mut().zip(chunk).for_each(|(slot, byte)| *slot = *byte);

@@ -6,6 +6,8 @@
 use super::run::{Outcome, Probe, Vm};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::simulate::Errorless;
+use std::collections::HashMap;
+use std::sync::{PoisonError, RwLock};
 
 /// The machine with what is mounted in each part of a program.
 #[derive(Debug)]
@@ -13,7 +15,15 @@ pub struct World {
     parts: Vec<Errorless>,
     origin: Position,
     tcp: bool,
+    /// Which part of a way is made until a block is met: the run from each set-up makes the same ways as the whole one.
+    met: RwLock<HashMap<Way, Option<f64>>>,
 }
+
+/// What is mounted, and where a way begins and ends: bits, so that only the very same way is the same.
+type Way = (usize, [u64; 12]);
+
+/// Ways that are kept, some 10 MB.
+const MOST_WAYS: usize = 50_000;
 
 /// How far a probe moves off a face until it closes, mm: any small way will do.
 const RELEASED_MM: f64 = 0.02;
@@ -21,7 +31,7 @@ const RELEASED_MM: f64 = 0.02;
 impl World {
     /// `origin`: machine coordinates at R's origin. `tcp`: coordinates are those of the tool centre point.
     pub fn new(parts: Vec<Errorless>, origin: &AxisMap, tcp: bool) -> Self {
-        Self { parts, origin: origin.position(), tcp }
+        Self { parts, origin: origin.position(), tcp, met: RwLock::default() }
     }
 
     /// Are the control's coordinates those of the tool centre point?
@@ -61,8 +71,8 @@ impl World {
             (true, false) => {
                 let (from, to) = (shifted(&probe.from, &vm.shift), shifted(&probe.to, &vm.shift));
                 let (from, to) = (self.axes(vm.part, &from), self.axes(vm.part, &to));
-                match self.parts.get(vm.part).and_then(|p| p.first(&from, &to)) {
-                    Some(met) => Outcome { hit: true, part: met.part },
+                match self.meets_at(vm.part, &from, &to) {
+                    Some(part) => Outcome { hit: true, part },
                     None => Outcome { hit: false, part: 1.0 },
                 }
             }
@@ -70,6 +80,22 @@ impl World {
             (false, true) => Outcome { hit: true, part: part(RELEASED_MM) },
             (false, false) => Outcome { hit: true, part: 0.0 },
         }
+    }
+
+    /// The part of a way until the ball meets a block.
+    fn meets_at(&self, part: usize, from: &Position, to: &Position) -> Option<f64> {
+        let mut bits = [0; 12];
+        bits.iter_mut().zip(from.0.iter().chain(&to.0)).for_each(|(bits, x)| *bits = x.to_bits());
+        let way = (part, bits);
+        if let Some(known) = self.met.read().unwrap_or_else(PoisonError::into_inner).get(&way) {
+            return *known;
+        }
+        let met = self.parts.get(part).and_then(|p| p.first(from, to)).map(|m| m.part);
+        let mut kept = self.met.write().unwrap_or_else(PoisonError::into_inner);
+        if kept.len() < MOST_WAYS {
+            kept.insert(way, met);
+        }
+        met
     }
 
     /// The block that a search meets.

@@ -428,9 +428,13 @@ impl<'a> Writer<'a> {
                     return Ok(());
                 }
                 let named = self.linear_words(to)?;
+                let place = self.place(to)?;
+                if self.is_made_by_touch(self.index) {
+                    self.moved(to);
+                    return Ok(());
+                }
                 let words = self.words(&named)?;
                 let (heading, length) = self.straight(to, &named);
-                let place = self.place(to)?;
                 let announces = self.announces();
                 self.render(
                     "protected",

@@ -7,6 +7,7 @@
 pub mod as_written;
 mod check;
 mod emit;
+mod environment;
 mod frame;
 mod inherit;
 mod log_text;

@@ -20,6 +20,12 @@ impl Postprocessor {
         })
     }
 
+    /// Does the touch go on along the lift, so that no guarded move is written there?
+    pub(super) fn touch_leaves(&self) -> bool {
+        let touch = if self.touch_with_cycle { "cycle" } else { "touch" };
+        self.templates.get_template(touch).is_ok_and(|t| t.source().contains("leaves"))
+    }
+
     /// Does a template use this setting?
     pub(super) fn names_setting(&self, name: &str) -> bool {
         let whole = |rest: &str| !rest.starts_with(|c: char| c.is_alphanumeric() || c == '_');

@@ -14,7 +14,6 @@ use std::collections::{BTreeMap, BTreeSet};
 pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, routed: &Routed) -> Vec<String> {
     let probe = &machine.probe;
     let mut lines = vec![
-        format!("Probing program {} for {}", spec.name, machine.name),
         spec.says.clone(),
         format!(
             "{} touches, about {}; the plan {}.plan.json belongs to it",
@@ -30,9 +29,9 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
     let tolerance = probe.placement_tolerance;
     lines.extend([
         if faces {
-            format!("  each block within {tolerance} mm of its place, its faces along the machine's axes")
+            format!("  each block within {tolerance} mm of its position, its faces along the machine's axes")
         } else {
-            format!("  what is touched within {tolerance} mm of its place")
+            format!("  what is touched within {tolerance} mm of its position")
         },
         format!("  a touch that is further off stops the program; the first of each {body} is made slowly"),
         "  the positions above and below are machine coordinates with all rotary axes at 0, ball's centre".to_owned(),
@@ -109,14 +108,14 @@ fn sense_lines(machine: &Machine, layout: &Layout) -> Vec<String> {
         let turn = axis.motion(&at).rotation;
         lines.push(if axis.side == Side::Tool {
             format!(
-                "  check the sense: at {} {angle} the ball stands towards {} of the pivot",
+                "  check the direction of {0}: at {0} {angle} the ball must be on the {1} side of the pivot",
                 axis.name,
                 towards(&(turn * -machine.tool.direction.into_inner()))
             )
         } else {
             let across = if axis.direction.x.abs() > 0.9 { Vector3::y() } else { Vector3::x() };
             format!(
-                "  check the sense: at {} {angle} what stood towards {} stands towards {}",
+                "  check the direction of {0}: at {0} {angle} what was towards {1} must be towards {2}",
                 axis.name,
                 towards(&across),
                 towards(&(turn * across))

@@ -4,7 +4,7 @@ use super::chain::{Chain, Stylus};
 use super::control::Compensation;
 use super::noise::Dice;
 use super::rigid::{Vec3, minus, unit};
-use super::scenario::{BlockError, Scenario};
+use super::scenario::{BlockError, RADIUS, Scenario};
 use super::terms::{Shifts, Terms, TouchState};
 use crate::axes::{AxisName, Position};
 use crate::diag::{Failure, Finding, Findings, Result};
@@ -57,6 +57,8 @@ pub struct Ready {
     pub wrong: Option<BlockError>,
     /// How much longer its half edges are than the plan says, beside that, mm.
     pub longer_half: Vec3,
+    /// The same of its radius, mm.
+    pub longer_radius: f64,
     /// Outward normal of the face in the carrier's frame.
     pub normal: Vec3,
     pub state: TouchState,
@@ -246,7 +248,8 @@ fn ready(
         half: block.size.map(|s| 0.5 * s),
         radius: 0.5 * block.diameter.unwrap_or(0.0),
         wrong: wrong_block(machine, plan, scenario, touch),
-        longer_half: longer_half(scenario, &state.label),
+        longer_half: [0, 1, 2].map(|along| longer_half(scenario, &state.label, along)),
+        longer_radius: longer_half(scenario, &state.label, RADIUS),
         normal: touch.normal,
         state,
         visit: 0,
@@ -269,14 +272,11 @@ fn wrong_block(machine: &Machine, plan: &Plan, scenario: &Scenario, touch: &Plan
     found.cloned()
 }
 
-/// How much longer the half edges of a block are, mm.
-fn longer_half(scenario: &Scenario, label: &str) -> Vec3 {
-    let mut out = [0.0; 3];
+/// How much longer one half edge of a block is, or its radius, mm.
+fn longer_half(scenario: &Scenario, label: &str, along: usize) -> f64 {
     let name = label.rsplit('/').next();
-    for edge in scenario.edges.iter().filter(|e| e.block == label || Some(e.block.as_str()) == name) {
-        out[edge.along] += edge.half_mm;
-    }
-    out
+    let of_it = scenario.edges.iter().filter(|e| e.block == label || Some(e.block.as_str()) == name);
+    of_it.filter(|e| e.along == along).map(|e| e.half_mm).sum()
 }
 
 /// Everything that the errors of a touch may depend on besides axis positions; senses and time come later.

@@ -68,12 +68,15 @@ pub struct BlockError {
     pub size_mm: Vec3,
 }
 
-/// An edge of one block that is longer than the plan says.
+/// In place of an edge: the radius.
+pub(super) const RADIUS: usize = 3;
+
+/// An edge or radius of one block that is longer than the plan says.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct LongerEdge {
     /// `mounting/block`, or `block`.
     pub block: String,
-    /// 0, 1, 2: along x, y, z of the block.
+    /// 0, 1, 2: along x, y, z of the block; [`RADIUS`]: of what is round.
     pub along: usize,
     /// By how much its half is longer, mm.
     pub half_mm: f64,
@@ -245,6 +248,9 @@ impl Scenario {
                         match (target, block) {
                             (Target::HalfSize(along), Some(block)) => {
                                 edges.push(LongerEdge { block: block.to_owned(), along, half_mm: f * base });
+                            }
+                            (Target::Radius, Some(block)) => {
+                                edges.push(LongerEdge { block: block.to_owned(), along: RADIUS, half_mm: f * base });
                             }
                             _ => terms.push(Term { target, shape, amount: f * base }),
                         }

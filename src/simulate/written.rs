@@ -279,11 +279,11 @@ impl Reader<'_> {
     fn effects(&mut self, out: &mut Scenario, node: &Node<'_>) {
         let Some(table) = self.table(node, "effects") else { return };
         for (id, node) in in_order(table) {
-            if &**id.get_ref() == "block-setup" {
+            if super::catalogue::is_a_set_up(id.get_ref()) {
                 self.error(
                     id.span(),
                     "scenario::block_setup",
-                    "block-setup has values for each block",
+                    format!("{} has values for each block", id.get_ref()),
                     "write a [[block]] table with mounting, name, shift and tilt for each",
                 );
                 continue;

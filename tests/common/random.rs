@@ -1,11 +1,60 @@
 //! Touches at random, for laws that hold at every pose.
 
 use axiscal::axes::AxisMap;
-use axiscal::machine::{Machine, Mounting};
+use axiscal::machine::{Block, Form, Machine, Mounting};
 use axiscal::program::plan::{ControllerFrame, FORMAT, Plan, PlanBlock, PlanTouch};
-use nalgebra::Vector3;
+use axiscal::program::ring_points;
+use axiscal::program::spec::Along;
+use nalgebra::{Rotation3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
+
+/// A point of a body, and its normal.
+fn random_point(block: &Block, rng: &mut ChaCha8Rng) -> (Vector3<f64>, Vector3<f64>) {
+    let ends = block.form == Form::Cylinder && rng.random_bool(0.3);
+    if block.form.is_round() && !ends {
+        let along = match block.form {
+            Form::Sphere => Along::Elevation(rng.random_range(-60.0..90.0)),
+            _ => Along::Depth(rng.random_range(0.2..0.8) * block.size.z),
+        };
+        let p = ring_points::place(block, rng.random_range(0.0..360.0), along, &Rotation3::identity()).unwrap();
+        return (p.point, p.normal);
+    }
+    let mut normal = Vector3::zeros();
+    let side = if block.form == Form::Box { rng.random_range(0..3) } else { 2 };
+    let up = block.form != Form::Box || rng.random_bool(0.5);
+    normal[side] = if up { 1.0 } else { -1.0 };
+    let mut point = block.centre;
+    for k in 0..3 {
+        let half = 0.5 * block.size[k];
+        point[k] += if k == side { half * normal[k] } else { rng.random_range(-0.6..0.6) * half };
+    }
+    (point, normal)
+}
+
+/// A mounting with a sphere, a pin, a ring and a plane where its blocks stand.
+pub fn of_other_forms(mounting: &Mounting) -> Mounting {
+    let mut out = mounting.clone();
+    let forms = [Form::Sphere, Form::Cylinder, Form::Bore, Form::Plane];
+    let first = out.blocks[0].clone();
+    out.blocks = forms
+        .iter()
+        .enumerate()
+        .map(|(i, form)| {
+            let mut b = first.clone();
+            (b.name, b.form) = (form.as_str().to_owned(), *form);
+            b.centre += Vector3::new(60.0 * i as f64, 0.0, 0.0);
+            (b.size, b.diameter) = match form {
+                Form::Sphere => (Vector3::repeat(25.0), Some(25.0)),
+                Form::Cylinder => (Vector3::new(20.0, 20.0, 30.0), Some(20.0)),
+                Form::Bore => (Vector3::new(50.0, 50.0, 20.0), Some(36.0)),
+                _ => (Vector3::new(40.0, 40.0, 10.0), None),
+            };
+            b
+        })
+        .collect();
+    out
+}
 
 /// Touches of random faces at random poses, feeds, spindle angles, stylus lengths, senses and times.
 pub fn random_plan(machine: &Machine, mounting: &Mounting, n_touches: usize, rng: &mut ChaCha8Rng) -> Plan {
@@ -23,14 +72,7 @@ pub fn random_plan(machine: &Machine, mounting: &Mounting, n_touches: usize, rng
     let mut touches = Vec::new();
     for i in 0..n_touches {
         let block = &mounting.blocks[rng.random_range(0..mounting.blocks.len())];
-        let mut normal = Vector3::zeros();
-        let side = rng.random_range(0..3);
-        normal[side] = if rng.random_bool(0.5) { 1.0 } else { -1.0 };
-        let mut point = block.centre;
-        for k in 0..3 {
-            let half = 0.5 * block.size[k];
-            point[k] += if k == side { half * normal[k] } else { rng.random_range(-0.6..0.6) * half };
-        }
+        let (point, normal) = random_point(block, rng);
         let mut pose = AxisMap::default();
         let mut from = AxisMap::default();
         for axis in machine.rotary() {

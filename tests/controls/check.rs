@@ -174,7 +174,7 @@ fn edits_by_hand_of_a_klartext_program_are_caught() {
         ("a call lost", with(&t, "CALL LBL 1\r", 1, &|_| String::new()), "check::touch_lacking"),
         (
             "a search beyond the block",
-            with(&t, "FN 0: Q1653 = +6\r", 1, &|l| l.replace("+6", "-30")),
+            with(&t, "FN 0: Q1663 = -4\r", 1, &|l| l.replace("-4", "-40")),
             "check::not_the_plan",
         ),
         (
@@ -249,14 +249,9 @@ fn a_run_that_starts_again_meets_each_block_slowly() {
         let mut original = original(controller, None);
         original.plan.programs.clear();
         if controller == "heidenhain" {
-            // of the two conditions, the one before the slow feed
-            let lines: Vec<&str> = original.text.split_inclusive('\n').collect();
-            let at = (1..lines.len())
-                .find(|i| lines[*i].contains("Q1665 = +60") && lines[*i - 1].contains("FN 12: IF +Q1600 LT +2 GOTO"));
-            let mut edited: Vec<String> = lines.iter().map(|l| (*l).to_owned()).collect();
-            let condition = &mut edited[at.unwrap() - 1];
-            *condition = condition.replace("LT +2", "LT +9");
-            let codes = original.codes(&edited.concat());
+            let edited = original.text.replacen("FN 0: Q1668 = +2", "FN 0: Q1668 = +9", 1);
+            assert_ne!(edited, original.text);
+            let codes = original.codes(&edited);
             assert!(codes.contains(&"check::feed"), "{controller}: {codes:?}");
             continue;
         }

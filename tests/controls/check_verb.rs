@@ -480,7 +480,7 @@ fn a_rough_touch_is_refused_without_a_plan() {
             "pushed past its overtravel",
         ),
         ("sinumerik", "small.mpf", "-30,0,6,2,60", "-30,0,4,2,60", "pushed past its overtravel"),
-        ("heidenhain", "small.h", "FN 0: Q1653 = +6", "FN 0: Q1653 = +4", "pushed past its overtravel"),
+        ("heidenhain", "small.h", "FN 0: Q1663 = -4", "FN 0: Q1663 = -6", "pushed past its overtravel"),
         ("fanuc", "small.nc", "Z1.5 D2. F300.", "Z1.5 D2. F900.", "fast_feed is 300"),
         ("sinumerik", "small.mpf", "-36,0,1.5,2,300", "-36,0,1.5,2,900", "fast_feed is 300"),
         ("heidenhain", "small.h", "FN 0: Q1665 = +300", "FN 0: Q1665 = +900", "fast_feed is 300"),

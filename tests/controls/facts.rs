@@ -165,10 +165,12 @@ fn the_table_of_sizes_in_the_guide() {
                 ("full", _) => (6000, 350),
                 _ => (usize::MAX, usize::MAX),
             };
-            if lines > most_lines || kb > most_kb {
+            let touches = generated.plan.touches.len();
+            // of HEIDENHAIN each argument is a line; the others have room for the head of a small program
+            let a_touch = if *name == "heidenhain" { 12 } else { 8 };
+            if lines > most_lines || kb > most_kb || lines > a_touch * touches {
                 wrong.push(format!("{name} {program}: {lines} lines, {kb} kB"));
             }
-            let touches = generated.plan.touches.len();
             let minutes = (generated.path.seconds / 60.0).round();
             let row = format!(
                 "| {name} | `{program}` on {machine_name} | {touches} | {lines} | {kb} | {:.1} | {minutes} |\n",

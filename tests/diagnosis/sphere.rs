@@ -75,7 +75,8 @@ fn radius_and_tip_are_one_number() {
     let rms = |fit: &serde_json::Value| fit["rms_um"].as_f64().unwrap();
     assert!((rms(&with_tip) - rms(&with_sphere)).abs() < 0.01, "{} {}", rms(&with_tip), rms(&with_sphere));
     // both at once: one combination without effect, and it names the two
-    std::fs::write(at.join("study.toml"), study.replace("\"pretravel\"", "\"pretravel\", \"artefact-diameter\"")).unwrap();
+    std::fs::write(at.join("study.toml"), study.replace("\"pretravel\"", "\"pretravel\", \"artefact-diameter\""))
+        .unwrap();
     let (both, _) = json(at, &["identify", "study.toml"]);
     let says = both["undetermined"].to_string();
     assert!(says.contains("pretravel") && says.contains("diameter"), "{says}");

@@ -8,9 +8,10 @@ use axiscal::model::catalogue::{Catalogue, Effect, Parameter};
 use axiscal::model::data::{Run, assemble_with_spindle};
 use axiscal::model::predict::{Model, SetUp};
 use axiscal::model::spindle::SpindleStretch;
+use axiscal::model::surface::Body;
 use axiscal::simulate::{self, Scenario};
 use common::more_machines::all_machines;
-use common::random::random_plan;
+use common::random::{of_other_forms, random_plan};
 use common::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -39,9 +40,15 @@ const SPINDLE: [[f64; 3]; 4] =
 fn scenario_text(effect: &Effect, mounting: &Mounting, set_ups: &[SetUp], theta: &[f64]) -> String {
     let mut text = if effect.id == "spindle-growth" { format!("spindle = {SPINDLE:?}\n") } else { String::new() };
     text += "[temperature]\nprofile = [[0.0, 19.0], [3.0, 24.0], [8.0, 21.0]]\n";
-    if effect.id == "block-setup" {
-        for (set_up, six) in set_ups.iter().zip(theta.chunks(6)) {
+    let set_ups: Vec<&SetUp> = set_ups.iter().filter(|s| effect.of.is_empty() || effect.of.contains(&s.body)).collect();
+    if effect.nuisance && effect.per_block {
+        for (set_up, own) in set_ups.iter().zip(theta.chunks(effect.parameters.len())) {
             let name = set_up.label.rsplit('/').next().unwrap();
+            let mut six = [0.0; 6];
+            for (p, value) in effect.parameters.iter().zip(own) {
+                let at = ["SX", "SY", "SZ", "SA", "SB", "SC"].iter().position(|n| *n == p.name);
+                six[at.unwrap_or(2)] = *value;
+            }
             text += &format!(
                 "[[block]]\nmounting = {:?}\nname = {name:?}\nshift = {:?}\ntilt = {:?}\n",
                 mounting.name,
@@ -53,7 +60,8 @@ fn scenario_text(effect: &Effect, mounting: &Mounting, set_ups: &[SetUp], theta:
     }
     text += &format!("[effects.{}]\n", effect.id);
     // what blocks have for themselves is given for each of them
-    let blocks: Vec<Option<&SetUp>> = if effect.per_block { set_ups.iter().map(Some).collect() } else { vec![None] };
+    let blocks: Vec<Option<&SetUp>> =
+        if effect.per_block { set_ups.into_iter().map(Some).collect() } else { vec![None] };
     for (block, own) in blocks.iter().zip(theta.chunks(effect.parameters.len())) {
         for (p, value) in effect.parameters.iter().zip(own) {
             let name = block.map_or_else(|| p.name.clone(), |b| format!("{}@{}", p.name, b.label));
@@ -73,6 +81,18 @@ struct Found {
     alone_mm: Vec<f64>,
 }
 
+/// Name of the mounting with other forms than boxes.
+const OTHER_FORMS: &str = "other forms";
+
+/// The machine with one more mounting, of other forms.
+fn with_other_forms(machine: &Machine) -> Machine {
+    let mut out = machine.clone();
+    let mut mounting = of_other_forms(&out.mountings[0]);
+    mounting.name = OTHER_FORMS.to_owned();
+    out.mountings.push(mounting);
+    out
+}
+
 fn plant(machine: &Machine, mounting: &Mounting, effect: &Effect, rng: &mut ChaCha8Rng) -> Result<Found, String> {
     let plan = random_plan(machine, mounting, 40, rng);
     // an errorless run says which blocks there are
@@ -89,7 +109,8 @@ fn plant(machine: &Machine, mounting: &Mounting, effect: &Effect, rng: &mut ChaC
         assemble_with_spindle(machine, &all, &spindle)
     };
     let set_ups = runs(&touches).set_ups;
-    let n_sets = if effect.per_block { set_ups.len() } else { 1 };
+    let has = |s: &&SetUp| effect.of.is_empty() || effect.of.contains(&s.body);
+    let n_sets = if effect.per_block { set_ups.iter().filter(has).count() } else { 1 };
     let parameters: Vec<&Parameter> = (0..n_sets).flat_map(|_| &effect.parameters).collect();
     let theta: Vec<f64> = parameters.iter().map(|p| random_value(effect, p, rng)).collect();
     let text = scenario_text(effect, mounting, &set_ups, &theta);
@@ -132,7 +153,14 @@ fn what_is_planted_is_what_is_predicted() {
             traces.insert((row, effect.id.clone(), p.name.clone()), 0.0);
         }
         for machine in machines.iter().filter(|m| effect.applies_to(m)) {
-            for mounting in &machine.mountings {
+            // the machine's own blocks, then a sphere, a pin, a ring and a plane in place of the first
+            let round = with_other_forms(machine);
+            let others = round.mountings.last().map(|m| (&round, m));
+            for (machine, mounting) in machine.mountings.iter().map(|m| (machine, m)).chain(others) {
+                let acts = |body: &Body| (*body == Body::Box) == (mounting.name != OTHER_FORMS);
+                if !effect.of.is_empty() && !effect.of.iter().any(acts) {
+                    continue;
+                }
                 let place = format!("{} on {} ({})", effect.id, machine.name, mounting.name);
                 let found = match plant(machine, mounting, effect, &mut rng) {
                     Ok(found) => found,
@@ -174,7 +202,7 @@ fn the_virtual_machine_plants_every_effect_that_the_catalogue_has_for_a_machine(
     let catalogue = Catalogue::built_in().unwrap();
     for machine in all_machines() {
         let known = simulate::catalogue::ids(&machine);
-        for effect in catalogue.iter().filter(|e| e.id != "block-setup") {
+        for effect in catalogue.iter().filter(|e| !(e.nuisance && e.per_block)) {
             let (here, there) = (catalogue.get(&effect.id, &machine).is_some(), known.contains(&effect.id));
             assert_eq!(here, there, "{} on {}: catalogue {here}, virtual machine {there}", effect.id, machine.name);
         }

@@ -7,11 +7,10 @@ use super::formula::formula;
 use super::masks::{Masks, folder, string};
 use super::scan::Scan;
 use crate::axes::AxisName;
-use crate::check::code::{Code, Expr, Instruction, Op, Piece, UnknownKind, Var, Word};
+use crate::check::code::{Code, Expr, Instruction, Links, Op, Piece, UnknownKind, Var, Word};
 use crate::check::lines::{Line, lines};
 use crate::check::run::Fault;
 use crate::post::Postprocessor;
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -71,8 +70,7 @@ struct Reader<'a> {
     /// What the control calls each axis; longer names first.
     names: Vec<(String, AxisName)>,
     code: Code,
-    labels: BTreeMap<u32, usize>,
-    jumps: Vec<(usize, u32, Range<usize>)>,
+    labels: Links<u32>,
     open: Option<Open>,
     /// Name and unit of BEGIN PGM.
     begun: Option<(String, String)>,
@@ -110,8 +108,7 @@ impl<'a> Reader<'a> {
             masks,
             names: post.number.spoken(),
             code: Code::default(),
-            labels: BTreeMap::new(),
-            jumps: Vec::new(),
+            labels: Links::default(),
             open: None,
             begun: None,
             ended: false,
@@ -185,7 +182,7 @@ impl<'a> Reader<'a> {
             let label = self.label(scan)?;
             if label == 0 {
                 self.code.push(at, Instruction::Return(None));
-            } else if self.labels.insert(label, self.code.statements.len()).is_some() {
+            } else if !self.labels.label(label, &self.code) {
                 return Err(Fault { at, says: format!("LBL {label} stands twice") });
             }
         } else if scan.take("CALL LBL ") {
@@ -193,7 +190,7 @@ impl<'a> Reader<'a> {
             let call = self
                 .code
                 .push(at.clone(), Instruction::Call { to: 0, gives: Vec::new(), texts: Vec::new(), is_step: true });
-            self.jumps.push((call, label, at));
+            self.labels.leads(call, label, at);
         } else if scan.take("TCH PROBE 4.0 MEASURING IN 3-D") {
             self.opened(at, Cycle::Probe);
             scan.end()?;
@@ -359,7 +356,7 @@ impl<'a> Reader<'a> {
         let over =
             self.code.push(at.clone(), Instruction::JumpUnless(Expr::Two(op, Box::new(left), Box::new(right)), 0));
         let jump = self.code.push(at.clone(), Instruction::Jump(0));
-        self.jumps.push((jump, label, at));
+        self.labels.leads(jump, label, at);
         self.code.aim(over, jump + 1);
         Ok(())
     }
@@ -510,12 +507,8 @@ impl<'a> Reader<'a> {
         if !self.ended {
             return Err(Fault { at: end..end, says: "the program ends without END PGM".to_owned() });
         }
-        for (jump, label, at) in std::mem::take(&mut self.jumps) {
-            let Some(to) = self.labels.get(&label).copied() else {
-                return Err(Fault { at, says: format!("there is no LBL {label}") });
-            };
-            self.code.aim(jump, to);
-        }
+        self.labels
+            .resolve(&mut self.code, |_, label, at| Err(Fault { at, says: format!("there is no LBL {label}") }))?;
         Ok(self.code)
     }
 }

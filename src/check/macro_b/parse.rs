@@ -4,7 +4,8 @@
 //! (p. 116) for DPRNT; the rest as the postprocessor files say, unverified where they say so.
 
 use crate::axes::AxisName;
-use crate::check::code::{Code, Expr, Function, Instruction, Op, Piece, Text, Var, Word};
+use crate::check::code::{Code, Expr, Function, Instruction, Links, Op, Piece, Text, Var, Word};
+use crate::check::ladder::{self, COMPARISONS, Ladder};
 use crate::check::lines::{Line, blanks, lines, number, unsigned};
 use crate::check::run::Fault;
 use crate::post::Postprocessor;
@@ -65,14 +66,13 @@ struct Reader<'p> {
     there: Vec<u32>,
     /// The program that is read, by its place among them.
     program: usize,
-    /// Where each label of a program leads, and in which line it stands.
-    labels: BTreeMap<(usize, u32), (usize, usize)>,
+    /// The labels of each program.
+    labels: Links<(usize, u32)>,
+    /// In which line each of them stands.
+    stand_in: BTreeMap<(usize, u32), usize>,
     lines: usize,
-    /// To a label of which program.
-    jumps: Vec<(usize, (usize, u32), Range<usize>)>,
-    /// First statements of the programs.
-    starts: BTreeMap<u32, usize>,
-    calls: Vec<(usize, u32)>,
+    /// The programs that are called, by their numbers.
+    programs: Links<u32>,
     percents: usize,
     number: bool,
     ended: bool,
@@ -157,8 +157,7 @@ impl Reader<'_> {
             if self.program == 0 {
                 self.code.number = Some((digits.to_owned(), line.rest(rest)));
             } else if let Ok(number) = digits.parse()
-                && (self.there.first() == Some(&number)
-                    || self.starts.insert(number, self.code.statements.len()).is_some())
+                && (self.there.first() == Some(&number) || !self.programs.label(number, &self.code))
             {
                 return Err(line.fault(rest, format!("two programs have the number {digits}")));
             }
@@ -168,9 +167,8 @@ impl Reader<'_> {
         let mut rest = rest;
         if let Ok((after, digits)) = preceded(char('N'), digit1::<_, nom::error::Error<&str>>).parse(rest) {
             let label = self.label(line, rest, digits)?;
-            if let Some((_, first)) =
-                self.labels.insert((self.program, label), (self.code.statements.len(), self.lines))
-            {
+            self.labels.label((self.program, label), &self.code);
+            if let Some(first) = self.stand_in.insert((self.program, label), self.lines) {
                 return Err(line.fault(rest, format!("N{label} stands twice, first in line {first}")));
             }
             rest = blanks(after).map_err(|e| line.unread(&e, "a block"))?.0;
@@ -235,7 +233,7 @@ impl Reader<'_> {
         };
         let label = self.label(line, after, digits)?;
         let jump = self.code.push(at.clone(), Instruction::Leave(0));
-        self.jumps.push((jump, (0, label), at.clone()));
+        self.labels.leads(jump, (0, label), at.clone());
         // the control comes to nothing behind it
         self.code.push(at, Instruction::Return(None));
         Ok(left)
@@ -263,8 +261,9 @@ impl Reader<'_> {
             gives.push((var, value));
             left = blanks(after).map_err(|e| line.unread(&e, "an argument"))?.0;
         }
-        let call = self.code.push(at, Instruction::Call { to: 0, gives, texts: Vec::new(), is_step: true });
-        self.calls.push((call, number));
+        let what = Instruction::Call { to: 0, gives, texts: Vec::new(), is_step: true };
+        let call = self.code.push(at.clone(), what);
+        self.programs.leads(call, number, at);
         Ok(left)
     }
 
@@ -274,7 +273,7 @@ impl Reader<'_> {
             .map_err(|e: Failed<'_>| line.unread(&e, "GOTO and a sequence number"))?;
         let label = self.label(line, rest, digits)?;
         let jump = self.code.push(at.clone(), Instruction::Jump(0));
-        self.jumps.push((jump, (self.program, label), at));
+        self.labels.leads(jump, (self.program, label), at);
         Ok(after)
     }
 
@@ -369,17 +368,9 @@ impl Reader<'_> {
         if !self.ended {
             return Err(Fault { at: end..end, says: "the program has no M30".to_owned() });
         }
-        for (jump, label, at) in std::mem::take(&mut self.jumps) {
-            let Some((to, _)) = self.labels.get(&label).copied() else {
-                return Err(Fault { at, says: format!("there is no N{}", label.1) });
-            };
-            self.code.aim(jump, to);
-        }
-        for (call, number) in std::mem::take(&mut self.calls) {
-            // numbers of programs are those of lines that were read
-            let to = self.starts.get(&number).copied().unwrap_or(self.code.statements.len());
-            self.code.aim(call, to);
-        }
+        let lacks = |name: String, at| Err(Fault { at, says: format!("there is no {name}") });
+        self.labels.resolve(&mut self.code, |_, (_, label), at| lacks(format!("N{label}"), at))?;
+        self.programs.resolve(&mut self.code, |_, number, at| lacks(format!("O{number}"), at))?;
         Ok(self.code)
     }
 }
@@ -465,71 +456,37 @@ fn word_value(input: &str) -> IResult<&str, (Expr, bool)> {
 }
 
 fn value(input: &str) -> IResult<&str, Expr> {
-    let call = |name: &'static str, function: Function| {
-        preceded(tag(name), cut(bracketed)).map(move |e| Expr::Call(function, Box::new(e)))
-    };
     alt((
         unsigned.map(|(n, _)| Expr::Number(n)),
         variable,
         bracketed,
-        call("ABS", Function::Abs),
-        call("SQRT", Function::Sqrt),
-        call("ROUND", Function::Round),
-        call("FIX", Function::Truncate),
-        call("FUP", Function::Ceil),
+        ladder::function(FUNCTIONS, bracketed),
         preceded(char('-'), value).map(|e| Expr::Call(Function::Minus, Box::new(e))),
     ))
     .parse(input)
 }
 
-fn expression(input: &str) -> IResult<&str, Expr> {
-    level(input, 0)
-}
-
-fn level(input: &str, depth: usize) -> IResult<&str, Expr> {
-    let Some(parse) = LEVELS.get(depth) else { return value(input) };
-    let (mut rest, mut left) = level(input, depth + 1)?;
-    while let Ok((after, op)) = parse(rest) {
-        let (after, right) = cut(|i| level(i, depth + 1)).parse(after)?;
-        left = Expr::Two(op, Box::new(left), Box::new(right));
-        rest = after;
-    }
-    Ok((rest, left))
-}
-
-type OpParser = fn(&str) -> IResult<&str, Op>;
-
-const LEVELS: [OpParser; 3] = [
-    |i| {
-        alt((
-            tag("EQ").map(|_| Op::Eq),
-            tag("NE").map(|_| Op::Ne),
-            tag("GT").map(|_| Op::Gt),
-            tag("GE").map(|_| Op::Ge),
-            tag("LT").map(|_| Op::Lt),
-            tag("LE").map(|_| Op::Le),
-        ))
-        .parse(i)
-    },
-    |i| {
-        alt((
-            char('+').map(|_| Op::Add),
-            char('-').map(|_| Op::Sub),
-            tag("XOR").map(|_| Op::Xor),
-            tag("OR").map(|_| Op::Or),
-        ))
-        .parse(i)
-    },
-    |i| {
-        alt((
-            char('*').map(|_| Op::Mul),
-            char('/').map(|_| Op::Div),
-            tag("MOD").map(|_| Op::Mod),
-            tag("AND").map(|_| Op::And),
-        ))
-        .parse(i)
-    },
+const FUNCTIONS: &[(&str, Function)] = &[
+    ("ABS", Function::Abs),
+    ("SQRT", Function::Sqrt),
+    ("ROUND", Function::Round),
+    ("FIX", Function::Truncate),
+    ("FUP", Function::Ceil),
 ];
+
+const LADDER: Ladder = Ladder {
+    levels: &[
+        COMPARISONS,
+        &[("+", Op::Add), ("-", Op::Sub), ("XOR", Op::Xor), ("OR", Op::Or)],
+        &[("*", Op::Mul), ("/", Op::Div), ("MOD", Op::Mod), ("AND", Op::And)],
+    ],
+    gap: |input| Ok((input, "")),
+    value,
+};
+
+fn expression(input: &str) -> IResult<&str, Expr> {
+    LADDER.expression(input)
+}
 
 #[cfg(test)]
 mod tests {

@@ -3,17 +3,17 @@
 //! Source: LinuxCNC 2.9 manual, chapters 11.3 (lines, words, expressions), 11.4 (comments), 11.7 (O-codes).
 
 use super::comments::{Acting, comments};
-use crate::check::code::{Code, Expr, Function, Instruction, Op, UnknownKind, Var, Word};
+use crate::check::code::{Code, Expr, Function, Instruction, Links, Op, UnknownKind, Var, Word};
+use crate::check::ladder::{self, COMPARISONS, Ladder};
 use crate::check::lines::{Line, blanks, lines, number, unsigned};
 use crate::check::run::Fault;
 use nom::branch::alt;
-use nom::bytes::complete::{tag, tag_no_case, take_while1};
+use nom::bytes::complete::{tag_no_case, take_while1};
 use nom::character::complete::{char, digit1, one_of};
 use nom::combinator::{cut, opt};
 use nom::multi::many0;
 use nom::sequence::{delimited, preceded};
 use nom::{IResult, Parser};
-use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -45,8 +45,7 @@ const FURTHER_O_WORDS: [&str; 7] = ["while", "endwhile", "do", "repeat", "endrep
 struct Reader {
     code: Code,
     open: Vec<Open>,
-    subs: BTreeMap<String, usize>,
-    calls: Vec<(usize, String, Range<usize>)>,
+    subs: Links<String>,
     percents: usize,
     /// A line that is not blank has come.
     begun: bool,
@@ -210,7 +209,7 @@ impl Reader {
                 }
                 self.first_use(line, rest, &label)?;
                 let over = self.code.push(at.clone(), Instruction::Jump(0));
-                self.subs.insert(label.clone(), self.code.statements.len());
+                self.subs.label(label.clone(), &self.code);
                 self.open.push(Open { label, at, kind: Kind::Sub { over } });
                 after
             }
@@ -243,7 +242,7 @@ impl Reader {
                 let is_step = !given.is_empty();
                 let gives = (1..).map(Var::Number).zip(given).collect();
                 let call = self.code.push(at.clone(), Instruction::Call { to: 0, gives, texts: Vec::new(), is_step });
-                self.calls.push((call, label, at));
+                self.subs.leads(call, label, at);
                 left
             }
             other if FURTHER_O_WORDS.contains(&other) => {
@@ -258,7 +257,7 @@ impl Reader {
     /// A number may serve again where the structure before it is closed; a subroutine may not.
     fn first_use(&mut self, line: &Line<'_>, rest: &str, label: &str) -> Result<(), Fault> {
         let open = self.open.iter().any(|o| o.label == label);
-        if open || self.subs.contains_key(label) {
+        if open || self.subs.has(&label.to_owned()) {
             return Err(line.fault(rest, format!("o{label} is used twice")));
         }
         Ok(())
@@ -302,13 +301,11 @@ impl Reader {
         if self.percents == 1 {
             return Err(Fault { at: end..end, says: "the program ends without its second %".to_owned() });
         }
-        for (call, label, at) in std::mem::take(&mut self.calls) {
-            match self.subs.get(&label).copied() {
-                Some(sub) => self.code.aim(call, sub),
-                // a file of that name, in a folder of the control
-                None => self.code.is_unknown_of(UnknownKind::Program, at, format!("o<{label}> call")),
-            }
-        }
+        self.subs.resolve(&mut self.code, |code, label, at| {
+            // a file of that name, in a folder of the control
+            code.is_unknown_of(UnknownKind::Program, at, format!("o<{label}> call"));
+            Ok(())
+        })?;
         Ok(self.code)
     }
 }
@@ -353,67 +350,33 @@ fn function(input: &str) -> IResult<&str, Expr> {
         Expr::Var(var) => Expr::Exists(var),
         other => other,
     });
-    let call = |name: &'static str, function: Function| {
-        preceded(tag_no_case(name), cut(bracketed)).map(move |e| Expr::Call(function, Box::new(e)))
-    };
-    alt((
-        exists,
-        call("ABS", Function::Abs),
-        call("SQRT", Function::Sqrt),
-        call("ROUND", Function::Round),
-        call("FIX", Function::Floor),
-        call("FUP", Function::Ceil),
-    ))
-    .parse(input)
+    alt((exists, ladder::function(FUNCTIONS, bracketed))).parse(input)
 }
+
+const FUNCTIONS: &[(&str, Function)] = &[
+    ("ABS", Function::Abs),
+    ("SQRT", Function::Sqrt),
+    ("ROUND", Function::Round),
+    ("FIX", Function::Floor),
+    ("FUP", Function::Ceil),
+];
 
 /// The operators, from the loosest to the tightest (manual 11.3.9).
+const LADDER: Ladder = Ladder {
+    levels: &[
+        &[("AND", Op::And), ("XOR", Op::Xor), ("OR", Op::Or)],
+        COMPARISONS,
+        &[("+", Op::Add), ("-", Op::Sub)],
+        &[("*", Op::Mul), ("/", Op::Div), ("MOD", Op::Mod)],
+        &[("**", Op::Pow)],
+    ],
+    gap: blanks,
+    value,
+};
+
 fn expression(input: &str) -> IResult<&str, Expr> {
-    level(input, 0)
+    LADDER.expression(input)
 }
-
-fn level(input: &str, depth: usize) -> IResult<&str, Expr> {
-    let Some(parse) = LEVELS.get(depth) else { return value(input) };
-    let (mut rest, mut left) = level(input, depth + 1)?;
-    while let Ok((after, op)) = delimited(blanks, *parse, blanks).parse(rest) {
-        let (after, right) = cut(|i| level(i, depth + 1)).parse(after)?;
-        left = Expr::Two(op, Box::new(left), Box::new(right));
-        rest = after;
-    }
-    Ok((rest, left))
-}
-
-type OpParser = fn(&str) -> IResult<&str, Op>;
-
-const LEVELS: [OpParser; 5] = [
-    |i| {
-        alt((
-            tag_no_case("AND").map(|_| Op::And),
-            tag_no_case("XOR").map(|_| Op::Xor),
-            tag_no_case("OR").map(|_| Op::Or),
-        ))
-        .parse(i)
-    },
-    |i| {
-        alt((
-            tag_no_case("EQ").map(|_| Op::Eq),
-            tag_no_case("NE").map(|_| Op::Ne),
-            tag_no_case("GT").map(|_| Op::Gt),
-            tag_no_case("GE").map(|_| Op::Ge),
-            tag_no_case("LT").map(|_| Op::Lt),
-            tag_no_case("LE").map(|_| Op::Le),
-        ))
-        .parse(i)
-    },
-    |i| alt((char('+').map(|_| Op::Add), char('-').map(|_| Op::Sub))).parse(i),
-    |i| {
-        if i.starts_with("**") {
-            return Err(nom::Err::Error(nom::error::Error::new(i, nom::error::ErrorKind::Tag)));
-        }
-        alt((char('*').map(|_| Op::Mul), char('/').map(|_| Op::Div), tag_no_case("MOD").map(|_| Op::Mod))).parse(i)
-    },
-    |i| tag("**").map(|_| Op::Pow).parse(i),
-];
 
 #[cfg(test)]
 mod tests {

@@ -92,6 +92,32 @@ impl Writer<'_> {
         to.iter().all(|(axis, value)| self.began.get(axis).is_some_and(|began| (began - value).abs() < SAME))
     }
 
+    /// Where the lift goes right after a touch, if that is a guarded move of the lift alone from where the touch began.
+    fn lift_after(&self, touch: usize) -> Option<f64> {
+        let (lift, _) = self.lift_top()?;
+        let [Step::Touch(made), Step::Retract { to: back, .. }, Step::Protected { to, .. }] =
+            self.path.steps.get(touch..touch + 3)?
+        else {
+            return None;
+        };
+        let is_start = back.iter().all(|(axis, value)| made.start.get(axis).is_none_or(|at| (at - value).abs() < SAME));
+        to.get(lift).filter(|_| is_start && to.iter().count() == 1)
+    }
+
+    /// Is this guarded move a part of the touch before it?
+    pub(super) fn is_made_by_touch(&self, step: usize) -> bool {
+        self.post.touch_leaves() && step.checked_sub(2).is_some_and(|touch| self.lift_after(touch).is_some())
+    }
+
+    /// Where the lift stands when the routine of a touch is over, as the control takes it; nothing without a lift.
+    pub(super) fn leaves(&mut self, start: &nalgebra::Vector3<f64>) -> Value {
+        let Some((lift, _)) = self.lift_top() else { return Value::from(()) };
+        let at = self.lift_after(self.index).unwrap_or(start[lift.index()]);
+        let value = self.post.number.position(lift, self.shown(lift, at));
+        let fresh = self.is_fresh("leaves", &value);
+        context! { value, fresh }
+    }
+
     /// What routines hold that is the same in every call.
     pub(super) fn of_routines(&self) -> Result<Value> {
         let probe = &self.machine.probe;

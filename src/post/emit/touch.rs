@@ -45,6 +45,13 @@ impl Writer<'_> {
             .collect();
         let from = self.words(&xyz(&start))?;
         let all = self.fresh(&xyz(&end))?;
+        let by = AxisName::ALL.into_iter().zip(way.iter()).map(|(axis, mm)| {
+            let value = self.post.number.position(axis, *mm);
+            let fresh = self.is_fresh(&format!("by {axis}"), &value);
+            context! { axis => axis.to_string(), value, fresh }
+        });
+        let by = by.collect::<Vec<Value>>();
+        let leaves = self.leaves(&start);
         let before = self.met_before(touch);
         let way = self.length((nominal - start).norm());
         let search_feed = self.feed(touch.search_feed)?;
@@ -68,6 +75,8 @@ impl Writer<'_> {
             end => self.words(&target)?,
             pose => self.words(&touch.pose)?,
             all,
+            by,
+            leaves,
             length => self.length(length),
             approach => approach.clone(),
             way,

@@ -103,7 +103,7 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
 
 /// Has an effect values for each block? Their names end in `@mounting/block`, or `@block`.
 fn is_of_blocks(id: &str) -> bool {
-    id == "block-own-size"
+    matches!(id, "block-own-size" | "artefact-diameter")
 }
 
 /// The name of a parameter, and the block that it is of.
@@ -124,9 +124,17 @@ pub fn ids(machine: &Machine) -> Vec<String> {
     all(machine).filter(|id| parameters(id, machine, &|_| Some(1.0)).is_ok()).collect()
 }
 
+/// Effects that say where a body stands: each has a place of its own, which a scenario gives in `[[block]]`.
+const SET_UPS: [&str; 5] = ["block-setup", "sphere-setup", "cylinder-setup", "cylinder-height", "plane-setup"];
+
+/// Is this the id of an effect that says where a body stands?
+pub fn is_a_set_up(id: &str) -> bool {
+    SET_UPS.contains(&id)
+}
+
 /// Is this the id of an effect that some machine can have?
 pub fn is_known(id: &str, machine: &Machine) -> bool {
-    id == "block-setup" || all(machine).any(|known| known == id)
+    is_a_set_up(id) || all(machine).any(|known| known == id)
 }
 
 fn all(machine: &Machine) -> impl Iterator<Item = String> {
