@@ -249,7 +249,7 @@ impl Scenario {
                             (Target::HalfSize(along), Some(block)) => {
                                 edges.push(LongerEdge { block: block.to_owned(), along, half_mm: f * base });
                             }
-                            (Target::Radius, Some(block)) => {
+                            (Target::SphereRadius | Target::CylinderRadius, Some(block)) => {
                                 edges.push(LongerEdge { block: block.to_owned(), along: RADIUS, half_mm: f * base });
                             }
                             _ => terms.push(Term { target, shape, amount: f * base }),

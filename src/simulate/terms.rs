@@ -132,8 +132,10 @@ pub enum Target {
     HalfSize(usize),
     /// The same in parts of the edge.
     HalfSizeRatio,
-    /// The radius of what is round, mm.
-    Radius,
+    /// The radius of a sphere, mm.
+    SphereRadius,
+    /// The radius of a cylinder or a hole, mm.
+    CylinderRadius,
     /// The block's place in its carrier, component 0 to 5.
     Block(usize),
     /// The block's place, away from the carrier's centre line, mm.
@@ -341,8 +343,10 @@ pub struct Shifts {
     pub half_size: Vec3,
     /// The same in parts of the edge.
     pub half_size_ratio: f64,
-    /// Radius of what is round, mm.
-    pub radius: f64,
+    /// Radius of a sphere, mm.
+    pub sphere_radius: f64,
+    /// Radius of a cylinder or a hole, mm.
+    pub cylinder_radius: f64,
     /// Displacement of the block in its carrier, mm and rad.
     pub block: [f64; 6],
     /// Displacement of the block outward, mm.
@@ -367,7 +371,8 @@ impl Shifts {
             Target::Late => self.late += value,
             Target::HalfSize(i) => self.half_size[i] += value,
             Target::HalfSizeRatio => self.half_size_ratio += value,
-            Target::Radius => self.radius += value,
+            Target::SphereRadius => self.sphere_radius += value,
+            Target::CylinderRadius => self.cylinder_radius += value,
             Target::Block(i) => self.block[i] += value,
             Target::BlockOutward => self.block_outward += value,
         }

@@ -152,9 +152,9 @@ fn real_block(bench: &Bench<'_>, ready: &Ready, shifts: &Shifts) -> (Rigid, Body
     }
     // a sphere is larger by its half axes, a cylinder and a hole by their radius
     if ready.form == Form::Sphere {
-        half = plus(half, shifts.radius + ready.longer_radius, [1.0; 3]);
+        half = plus(half, shifts.sphere_radius + ready.longer_radius, [1.0; 3]);
     }
-    let radius = ready.radius * (1.0 + shifts.half_size_ratio) + shifts.radius + ready.longer_radius;
+    let radius = ready.radius * (1.0 + shifts.half_size_ratio) + shifts.cylinder_radius + ready.longer_radius;
     (frame, Body { form: ready.form, half, radius })
 }
 

@@ -60,7 +60,7 @@ fn a_lobed_probe_is_not_called_an_error_of_the_machine() {
     }
 }
 
-/// What is left of a touch is the sum of two radii: the diagnosis does not name one of the two, and `artefact-diameter` in place of
+/// What is left of a touch is the sum of two radii: the diagnosis does not name one of the two, and `sphere-diameter` in place of
 /// `pretravel` fits as well.
 #[test]
 fn radius_and_tip_are_one_number() {
@@ -70,12 +70,12 @@ fn radius_and_tip_are_one_number() {
     let study = std::fs::read_to_string(at.join("study.toml")).unwrap();
     assert!(study.contains("\"pretravel\""));
     let (with_tip, _) = json(at, &["identify", "study.toml"]);
-    std::fs::write(at.join("study.toml"), study.replace("\"pretravel\"", "\"artefact-diameter\"")).unwrap();
+    std::fs::write(at.join("study.toml"), study.replace("\"pretravel\"", "\"sphere-diameter\"")).unwrap();
     let (with_sphere, _) = json(at, &["identify", "study.toml"]);
     let rms = |fit: &serde_json::Value| fit["rms_um"].as_f64().unwrap();
     assert!((rms(&with_tip) - rms(&with_sphere)).abs() < 0.01, "{} {}", rms(&with_tip), rms(&with_sphere));
     // both at once: one combination without effect, and it names the two
-    std::fs::write(at.join("study.toml"), study.replace("\"pretravel\"", "\"pretravel\", \"artefact-diameter\""))
+    std::fs::write(at.join("study.toml"), study.replace("\"pretravel\"", "\"pretravel\", \"sphere-diameter\""))
         .unwrap();
     let (both, _) = json(at, &["identify", "study.toml"]);
     let says = both["undetermined"].to_string();

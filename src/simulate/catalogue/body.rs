@@ -11,7 +11,7 @@ use crate::simulate::terms::{Shape, Target};
 pub fn ids(_: &Machine) -> Vec<String> {
     let weight = ["head-sag", "head-tilt", "table-sag", "table-load"];
     let artefact = ["block-size", "block-own-size", "block-shape", "block-slip", "block-temperature"];
-    let round = ["artefact-diameter", "sphere-form-2", "sphere-form-3", "stem-bending", "stem-sag"];
+    let round = ["sphere-diameter", "cylinder-diameter", "sphere-form-2", "sphere-form-3", "stem-bending", "stem-sag"];
     weight.into_iter().chain(artefact).chain(round).map(str::to_owned).collect()
 }
 
@@ -35,7 +35,8 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
         "table-load" => table_load(machine),
         "block-size" => Ok((0..3).map(size).collect()),
         "block-own-size" => Ok((0..3).map(own_size).collect()),
-        "artefact-diameter" => Ok(vec![Parameter::new("diameter", Um, [(Target::Radius, Shape::Constant, 0.5)])]),
+        "sphere-diameter" => Ok(diameter(Target::SphereRadius)),
+        "cylinder-diameter" => Ok(diameter(Target::CylinderRadius)),
         "sphere-form-2" => Ok(form_error(2)),
         "sphere-form-3" => Ok(form_error(3)),
         // the ball pushes the sphere away: its stem bends sideways and gives way along itself less than can be seen
@@ -61,9 +62,14 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
     }
 }
 
+/// What is round is larger; a hole is wider.
+fn diameter(target: Target) -> Vec<Parameter> {
+    vec![Parameter::new("diameter", Um, [(target, Shape::Constant, 0.5)])]
+}
+
 /// A sphere with two or three lobes about its upright axis.
 fn form_error(k: i32) -> Vec<Parameter> {
-    let row = |letter, shape| Parameter::at(format!("form{k}{letter}"), Um, Target::Radius, shape);
+    let row = |letter, shape| Parameter::at(format!("form{k}{letter}"), Um, Target::SphereRadius, shape);
     vec![row('c', Shape::FormCosine(k)), row('s', Shape::FormSine(k))]
 }
 

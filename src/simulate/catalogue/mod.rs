@@ -103,7 +103,7 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
 
 /// Has an effect values for each block? Their names end in `@mounting/block`, or `@block`.
 fn is_of_blocks(id: &str) -> bool {
-    matches!(id, "block-own-size" | "artefact-diameter")
+    matches!(id, "block-own-size" | "sphere-diameter" | "cylinder-diameter")
 }
 
 /// The name of a parameter, and the block that it is of.
