@@ -5,6 +5,7 @@
 
 mod add;
 mod assess;
+mod centres;
 mod check;
 mod common;
 mod compare;

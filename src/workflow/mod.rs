@@ -4,6 +4,7 @@
 //! workbench and users of the library call the same.
 
 pub mod active_compensation;
+pub mod centres;
 pub mod change;
 mod environment;
 pub mod examine;
@@ -13,6 +14,8 @@ pub mod history;
 pub mod join;
 mod load;
 pub mod new;
+pub mod overlay;
+pub mod own_part;
 pub mod plan_next;
 mod read_run;
 pub mod simulated_log;
