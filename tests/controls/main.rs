@@ -3,6 +3,7 @@
 
 mod any_machine;
 mod beside_the_axis;
+mod centres;
 mod check;
 mod check_branches;
 mod check_programs;

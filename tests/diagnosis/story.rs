@@ -18,13 +18,19 @@ fn blocks(page: &str) -> Vec<(String, String)> {
 
 #[test]
 fn the_commands_of_the_story_do_what_it_says() {
-    let page = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/docs/guide/story.md")).unwrap();
+    let n_commands = run_page("story.md");
+    assert!(n_commands >= 12, "{n_commands}");
+}
+
+/// Runs the commands of a page of the guide; how many there are.
+fn run_page(name: &str) -> usize {
+    let page = std::fs::read_to_string(format!("{}/docs/guide/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let mut said = String::new();
     let mut n_commands = 0;
     for (language, text) in blocks(&page) {
         match language.as_str() {
-            "toml" => {
+            "toml" | "csv" => {
                 let name = text.lines().next().unwrap().trim_start_matches("# ").to_owned();
                 std::fs::write(folder.path().join(name), text).unwrap();
             }
@@ -57,7 +63,12 @@ fn the_commands_of_the_story_do_what_it_says() {
             other => panic!("a block of {other:?} in the story"),
         }
     }
-    assert!(n_commands >= 12, "{n_commands}");
+    n_commands
+}
+
+#[test]
+fn the_commands_of_the_page_on_sphere_centres_do_what_it_says() {
+    assert_eq!(run_page("centres.md"), 3);
 }
 
 /// The README's main command: it ends well, with a compensation and the page.

@@ -161,8 +161,8 @@ impl<'a> Places<'a> {
         let other_end = if self.position_of == Counted::Ball { Counted::Spindle } else { Counted::Ball };
         let other_kind = if self.kind == Kind::Machine { Kind::Workpiece } else { Kind::Machine };
         let mut tries = vec![
-            (Self { unit: other_unit, ..self.clone() }, "in the other unit (--unit)".to_owned()),
             (Self { position_of: other_end, ..self.clone() }, format!("as positions of the {}", other_end.as_str())),
+            (Self { unit: other_unit, ..self.clone() }, "in the other unit (--unit)".to_owned()),
             (Self { kind: other_kind, ..self.clone() }, format!("as kind {}", other_kind.as_str())),
         ];
         let carriers =
@@ -172,8 +172,11 @@ impl<'a> Places<'a> {
                 .filter(|c| *c != self.carrier)
                 .map(|carrier| (Self { carrier, ..self.clone() }, format!("with the sphere on {carrier} (--carrier)"))),
         );
-        let mut would: Option<String> =
-            tries.iter().find(|(t, _)| t.typical_off(rows) <= self.room_mm()).map(|t| t.1.clone());
+        let fits = |tried: &Self, rows: &[CentreRow]| {
+            let ends = [Counted::Ball, Counted::Spindle].map(|position_of| Self { position_of, ..tried.clone() });
+            ends.iter().any(|t| t.typical_off(rows) <= self.room_mm())
+        };
+        let mut would: Option<String> = tries.iter().find(|(t, _)| fits(t, rows)).map(|t| t.1.clone());
         for axis in self.machine.rotary() {
             let turned: Vec<CentreRow> = rows
                 .iter()
@@ -183,7 +186,7 @@ impl<'a> Places<'a> {
                     r
                 })
                 .collect();
-            if would.is_none() && self.typical_off(&turned) <= self.room_mm() {
+            if would.is_none() && fits(self, &turned) {
                 would = Some(format!("with {} counted the other way round", axis.name));
             }
         }
