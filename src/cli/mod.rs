@@ -6,6 +6,7 @@
 mod add;
 mod artefacts;
 mod assess;
+mod centres;
 mod check;
 mod common;
 mod compare;
@@ -79,7 +80,7 @@ enum Verb {
     /// Print the paper's tables: given, identified, deviation
     Reproduce(reproduce::Args),
     /// Write a study: the measured runs and the effects of the model
-    New(new::Args),
+    New(Box<new::Args>),
     /// Identify the machine's errors from a study
     Identify(identify::Args),
     /// Find the physical effect that is missing: verdict, candidates, and what these touches cannot separate

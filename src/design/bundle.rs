@@ -196,7 +196,7 @@ fn ring(block: &Block) -> Vec<(f64, Along)> {
             // a tenth of a millimetre is fine enough to be read
             DEPTHS.iter().flat_map(|d| around(Along::Depth((d * block.size.z * 10.0).round() / 10.0))).collect()
         }
-        Form::Box | Form::Plane => Vec::new(),
+        _ => Vec::new(),
     }
 }
 

@@ -2,6 +2,8 @@
 //!
 //! Not a geometry kernel: shapes and distances of solids belong to `program::collision`.
 
+pub mod sphere;
+
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 
 /// A rigid transform, mm.

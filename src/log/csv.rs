@@ -105,7 +105,7 @@ fn header(line: &[u8], start: usize, separator: u8, places: &Places<'_>) -> Resu
 }
 
 /// `,` where numbers hold a comma and none holds a point.
-fn decimal_mark<'a>(lines: impl Iterator<Item = &'a [u8]>) -> u8 {
+pub(super) fn decimal_mark<'a>(lines: impl Iterator<Item = &'a [u8]>) -> u8 {
     let (mut comma, mut point) = (false, false);
     for line in lines.take(100) {
         comma |= line.contains(&b',');

@@ -4,6 +4,7 @@
 //! coordinates; [`match_to_plan`] finds the touch of the plan that each one is; [`read`] does all three, [`csv`] reads
 //! and writes the project's own form. Nothing is silently left out: what is not used is a finding with its place.
 
+pub mod centres;
 pub mod csv;
 mod finding_places;
 mod last_digit;

@@ -289,6 +289,9 @@ impl Check<'_> {
                 Form::Bore => {
                     "diameter (of the hole) and size = [x, y, z] (of the body round it, larger than the hole)"
                 }
+                Form::Centre | Form::Reading | Form::Part => {
+                    "a place in plans only: write sphere, cylinder, bore, plane or box with its dimensions"
+                }
             };
             self.error(
                 &b.name.span(),

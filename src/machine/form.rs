@@ -18,6 +18,15 @@ pub enum Form {
     Bore,
     /// A flat face that looks up: a table, a pallet.
     Plane,
+    /// The centre of a sphere as something else has measured it. In plans only.
+    #[schemars(skip)]
+    Centre,
+    /// The same as readings of a sensor, whose zero is unknown. In plans only.
+    #[schemars(skip)]
+    Reading,
+    /// A workpiece that is known by its nominal points: each is a plane of its own. In plans only.
+    #[schemars(skip)]
+    Part,
 }
 
 impl Form {
@@ -30,7 +39,16 @@ impl Form {
             Self::Cylinder => "cylinder",
             Self::Bore => "bore",
             Self::Plane => "plane",
+            Self::Centre => "centre",
+            Self::Reading => "reading",
+            Self::Part => "part",
         }
+    }
+
+    /// Is it known by its centre only? Then no probe has triggered, and no direction of approach means anything.
+    #[must_use]
+    pub fn is_centre(self) -> bool {
+        matches!(self, Self::Centre | Self::Reading)
     }
 
     /// Is it the default?

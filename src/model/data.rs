@@ -167,7 +167,8 @@ pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[Spindle
             clock_s = f64::max(clock_s, time_s);
             let t = hours_from_s(time_s - *first_touch_s.get_or_insert(time_s));
             earliest_h = f64::min(earliest_h, t);
-            senses(&mut last_sense, planned, previous);
+            let touched = run.plan.block_of(planned).is_none_or(|b| !b.form.is_centre());
+            senses(&mut last_sense, planned, previous, touched);
             before.next(planned);
             way.next(planned);
             previous = Some(planned);
@@ -330,10 +331,15 @@ fn run_label(runs: &[Run], index: usize) -> Option<String> {
     (n_equal > 1).then(|| format!("{name}#{}", index + 1))
 }
 
-/// +1 or -1: sense of each axis's last motion; of the touching move for an axis that moves in it.
-fn senses(last: &mut [f64; 6], touch: &PlanTouch, previous: Option<&PlanTouch>) {
+/// +1 or -1: sense of each axis's last motion; of the touching move for an axis that moves in it. A centre is the mean of touches
+/// from many sides: 0 for the linear axes.
+fn senses(last: &mut [f64; 6], touch: &PlanTouch, previous: Option<&PlanTouch>, touched: bool) {
     for name in AxisName::ALL {
         let i = name.index();
+        if !touched && !name.is_rotary() {
+            last[i] = 0.0;
+            continue;
+        }
         let in_touch = touch.end_position().get(name) - touch.start_position().get(name);
         if in_touch.abs() > 1e-9 {
             last[i] = in_touch.signum();

@@ -356,11 +356,11 @@ impl Model {
         }
         for term in &effect.terms {
             let slot = self.slot(machine, term.place, stated(machine, effect, term));
-            // an effect of some bodies that has one set of parameters for all of them
-            let on: Vec<bool> = match set_up {
-                None if !effect.of.is_empty() => self.set_ups.iter().map(|s| effect.of.contains(&s.body)).collect(),
-                _ => Vec::new(),
-            };
+            // an effect of some bodies that has one set of parameters for all of them; a trigger where a probe has triggered
+            let has_it = |s: &SetUp| set_up.is_some() || effect.of.is_empty() || effect.of.contains(&s.body);
+            let acts = |s: &SetUp| has_it(s) && (term.place != Place::Trigger || s.body.is_touched());
+            let on: Vec<bool> = self.set_ups.iter().map(acts).collect();
+            let on = if on.contains(&false) { on } else { Vec::new() };
             let everywhere = term.formula.constant().filter(|_| run.is_none() && on.is_empty());
             let changes = match (everywhere, set_up) {
                 (None, _) => Changes::WithTouch,
@@ -451,8 +451,10 @@ impl Model {
     /// spheres needs a sphere.
     #[must_use]
     pub fn has_parameters_of(&self, effect: &Effect) -> bool {
-        let of_these = effect.of.is_empty() || self.set_ups.iter().any(|s| effect.of.contains(&s.body));
-        of_these && !instances_of(effect, &self.set_ups).is_empty()
+        let of_triggers = effect.terms.iter().all(|t| t.place == Place::Trigger);
+        let has_it = |s: &SetUp| effect.of.is_empty() || effect.of.contains(&s.body);
+        let acts = |s: &SetUp| has_it(s) && (s.body.is_touched() || !of_triggers);
+        !instances_of(effect, &self.set_ups).is_empty() && (self.set_ups.is_empty() || self.set_ups.iter().any(acts))
     }
 
     /// The set-ups of the blocks.

@@ -35,6 +35,12 @@ pub enum Body {
     CylinderWithEnd,
     /// A shift, two turns.
     Plane,
+    /// The centre of a sphere that something else has measured: three shifts.
+    Centre,
+    /// The same as readings of a sensor with an unknown zero: three shifts.
+    Reading,
+    /// A workpiece that is known by its nominal points: three shifts, three turns.
+    Part,
 }
 
 impl Body {
@@ -47,7 +53,16 @@ impl Body {
             Self::Cylinder => "cylinder",
             Self::CylinderWithEnd => "cylinder-with-end",
             Self::Plane => "plane",
+            Self::Centre => "centre",
+            Self::Reading => "reading",
+            Self::Part => "part",
         }
+    }
+
+    /// Has a probe triggered on it? A centre comes from something else, and what is wrong with a trigger is not in it.
+    #[must_use]
+    pub fn is_touched(self) -> bool {
+        !matches!(self, Self::Centre | Self::Reading)
     }
 
     /// What a body of this form is while only these surfaces of it are touched.
@@ -57,6 +72,9 @@ impl Body {
             (Form::Box, ..) => Self::Box,
             (Form::Sphere, ..) => Self::Sphere,
             (Form::Plane, ..) => Self::Plane,
+            (Form::Centre, ..) => Self::Centre,
+            (Form::Reading, ..) => Self::Reading,
+            (Form::Part, ..) => Self::Part,
             (_, Surface::Plane { .. }, _) | (_, _, Some(Self::CylinderWithEnd)) => Self::CylinderWithEnd,
             (Form::Cylinder | Form::Bore, ..) => Self::Cylinder,
         }
@@ -64,10 +82,11 @@ impl Body {
 }
 
 /// What formulas see as `edge`: the whole length of the body along the normal, the diameter of what is round; negative where a
-/// larger body has its surface nearer to the ball's side, as a hole has.
+/// larger body has its surface nearer to the ball's side, as a hole has; 0 where a larger body is none of these.
 #[must_use]
 pub fn edge(block: &PlanBlock, surface: &Surface, normal: &Vector3<f64>) -> f64 {
     match surface {
+        Surface::Plane { .. } if block.form.is_centre() || block.form == Form::Part => 0.0,
         Surface::Plane { .. } => Vector3::from(block.size).dot(&normal.abs()),
         Surface::Sphere { radius, .. } => 2.0 * radius,
         Surface::Cylinder { radius, sense, .. } => 2.0 * radius * sense,
@@ -85,7 +104,9 @@ impl Surface {
             Form::Sphere => Self::Sphere { centre, radius },
             Form::Cylinder if !on_end => Self::Cylinder { centre, radius, sense: 1.0 },
             Form::Bore if !on_end => Self::Cylinder { centre, radius, sense: -1.0 },
-            Form::Box | Form::Plane | Form::Cylinder | Form::Bore => Self::Plane { point: touch.point.into(), normal },
+            Form::Box | Form::Plane | Form::Cylinder | Form::Bore | Form::Centre | Form::Reading | Form::Part => {
+                Self::Plane { point: touch.point.into(), normal }
+            }
         }
     }
 

@@ -49,7 +49,7 @@ fn body(b: &BlockRecord) -> Vec<(V, V)> {
     let radius = b.diameter.unwrap_or_default() / 2.0;
     let ends = || circles(centre - V::z() * (size.z / 2.0), V::z(), radius, &[0.0, size.z]);
     match b.form {
-        Form::Box | Form::Plane => edges(centre, size),
+        Form::Box | Form::Plane | Form::Part | Form::Centre | Form::Reading => edges(centre, size),
         Form::Sphere => [V::x(), V::y(), V::z()].iter().flat_map(|d| circles(centre, *d, radius, &[0.0])).collect(),
         Form::Cylinder => ends(),
         Form::Bore => ends().into_iter().chain(edges(centre, size)).collect(),

@@ -142,7 +142,7 @@ fn block_lines(machine: &Machine, block: &Block) -> Vec<String> {
     let edges = format!("{} x {} x {} mm", block.size.x, block.size.y, block.size.z);
     let across = block.diameter.unwrap_or_default();
     let mut line = match block.form {
-        Form::Box => format!("  block {}: {edges}", block.name),
+        Form::Box | Form::Centre | Form::Reading | Form::Part => format!("  block {}: {edges}", block.name),
         Form::Plane => format!("  plane {}: {edges}", block.name),
         Form::Sphere => format!("  sphere {}: {across} mm across", block.name),
         Form::Cylinder => format!("  cylinder {}: {across} mm across, {} mm high", block.name, block.size.z),

@@ -106,7 +106,8 @@ pub fn by_itself(plan: &Plan) -> Faults {
             format!("format is {:?}, expected {FORMAT:?}", plan.format),
         );
     }
-    stylus(&mut faults, Part::Plan, Some(plan.ball_radius_mm), Some(plan.tool_length_mm));
+    let only_centres = !plan.blocks.is_empty() && plan.blocks.iter().all(|b| b.form.is_centre());
+    stylus(&mut faults, Part::Plan, Some(plan.ball_radius_mm), Some(plan.tool_length_mm), only_centres);
     if let Some(mm) = plan.placement_tolerance_mm.filter(|mm| !(0.0..=LARGEST).contains(mm)) {
         let says = format!("placement_tolerance_mm is {}, expected 0 or more", Plain(mm));
         faults.add("plan::number", (Part::Plan, "placement_tolerance_mm"), AGAIN, says);
@@ -135,8 +136,10 @@ fn is_coordinate(value: f64) -> bool {
     value.abs() <= LARGEST
 }
 
-fn stylus(faults: &mut Faults, part: Part, ball_radius_mm: Option<f64>, tool_length_mm: Option<f64>) {
-    if let Some(mm) = ball_radius_mm.filter(|mm| !(*mm > 0.0 && *mm <= LARGEST_BALL_MM)) {
+/// `of_centres`: what something else has measured is the centre itself, without a ball that touches it.
+fn stylus(faults: &mut Faults, part: Part, ball_radius_mm: Option<f64>, tool_length_mm: Option<f64>, of_centres: bool) {
+    let is_none = |mm: f64| of_centres && mm == 0.0;
+    if let Some(mm) = ball_radius_mm.filter(|mm| !(*mm > 0.0 && *mm <= LARGEST_BALL_MM || is_none(*mm))) {
         let says = format!("ball_radius_mm is {}, expected more than 0 and up to {LARGEST_BALL_MM}", Plain(mm));
         faults.add("plan::ball_radius", (part, "ball_radius_mm"), AGAIN, says);
     }
@@ -190,7 +193,7 @@ fn check_touch(faults: &mut Faults, part: Part, touch: &PlanTouch) {
         let says = "its search ends where it starts".to_owned();
         faults.add("plan::no_search", (part, "end"), AGAIN, says);
     }
-    stylus(faults, part, touch.ball_radius_mm, touch.tool_length_mm);
+    stylus(faults, part, touch.ball_radius_mm, touch.tool_length_mm, false);
     let numbers = [
         // since the program began; a hundred days and more are none
         ("time_s", touch.time_s, 0.0..=1e7),

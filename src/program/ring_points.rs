@@ -67,7 +67,9 @@ pub fn place(
         }
         (Form::Sphere, Along::Depth(_)) => Err("a sphere has elevations and no depths"),
         (Form::Cylinder | Form::Bore, Along::Elevation(_)) => Err("a cylinder or bore has depths and no elevations"),
-        (Form::Box | Form::Plane, _) => Err("it is not round: it has faces"),
+        (Form::Box | Form::Plane | Form::Centre | Form::Reading | Form::Part, _) => {
+            Err("it is not round: it has faces")
+        }
     }
 }
 

@@ -88,7 +88,9 @@ impl Solid {
     fn of_body(block: &Block) -> Vec<Self> {
         let radius = block.diameter.unwrap_or_default() / 2.0;
         match block.form {
-            Form::Box | Form::Plane => vec![Self::cuboid(block.centre, block.size)],
+            Form::Box | Form::Plane | Form::Centre | Form::Reading | Form::Part => {
+                vec![Self::cuboid(block.centre, block.size)]
+            }
             Form::Sphere => vec![Self::ball(block.centre, radius)],
             Form::Cylinder => {
                 let foot = block.centre - Vector3::z() * (block.size.z / 2.0);

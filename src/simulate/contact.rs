@@ -17,7 +17,7 @@ impl Body {
     /// Distance of a place (negative inside), the direction away from the surface, and how many faces meet there.
     pub fn distance(&self, p: Vec3) -> (f64, Vec3, u8) {
         match self.form {
-            Form::Box | Form::Plane => distance(p, self.half),
+            Form::Box | Form::Plane | Form::Centre | Form::Reading | Form::Part => distance(p, self.half),
             Form::Sphere => {
                 let far = norm(p);
                 if far == 0.0 {

@@ -182,6 +182,9 @@ fn first_touch_s(plan: &Plan, scenario: &Scenario) -> f64 {
     scenario.clock.first_touch_s.unwrap_or(own)
 }
 
+/// Half edge of the box behind a plane through a centre, mm.
+const BEHIND_MM: f64 = 50.0;
+
 fn ready(
     machine: &Machine,
     plan: &Plan,
@@ -220,7 +223,11 @@ fn ready(
     let block = plan.block_of(touch).ok_or_else(|| format!("the plan lacks its block {:?}", touch.block))?;
     let ball_radius_mm = touch.ball_radius_mm.unwrap_or(plan.ball_radius_mm);
     let length_mm = touch.tool_length_mm.unwrap_or(plan.tool_length_mm);
-    if !(ball_radius_mm.is_finite() && ball_radius_mm > 0.0) {
+    let of_centre = block.form.is_centre();
+    if block.form == Form::Part {
+        return Err("a workpiece that is known by its nominal points has no body to touch".to_owned());
+    }
+    if !(ball_radius_mm.is_finite() && (ball_radius_mm > 0.0 || of_centre && ball_radius_mm == 0.0)) {
         return Err(format!("the ball's radius is {ball_radius_mm} mm"));
     }
     if !(length_mm.abs() < FAR && ball_radius_mm < FAR && block.centre.iter().all(|x| x.abs() < FAR)) {
@@ -235,6 +242,9 @@ fn ready(
     }
     let n_links = chain.links_to(carrier);
     let state = state(machine, plan, chain, (touch, block), (&start, &end), n_links, stylus);
+    // a centre is found by the three planes through it: each is the face of a large box behind it
+    let half = if of_centre { [BEHIND_MM; 3] } else { block.size.map(|s| 0.5 * s) };
+    let behind = if of_centre { BEHIND_MM } else { 0.0 };
     Ok(Ready {
         id: touch.id,
         number: 0,
@@ -243,9 +253,9 @@ fn ready(
         n_links,
         stylus,
         ball_radius_mm,
-        centre: block.centre,
+        centre: std::array::from_fn(|i| block.centre[i] - behind * touch.normal[i]),
         form: block.form,
-        half: block.size.map(|s| 0.5 * s),
+        half,
         radius: 0.5 * block.diameter.unwrap_or(0.0),
         wrong: wrong_block(machine, plan, scenario, touch),
         longer_half: [0, 1, 2].map(|along| longer_half(scenario, &state.label, along)),
@@ -337,6 +347,8 @@ fn edge_mm(block: &PlanBlock, normal: Vec3) -> f64 {
         Form::Sphere => across,
         Form::Cylinder if normal[2].abs() < 0.5 => across,
         Form::Bore if normal[2].abs() < 0.5 => -across,
+        // planes through single points: a larger body is none of these
+        Form::Centre | Form::Reading | Form::Part => 0.0,
         _ => (0..3).map(|i| block.size[i] * normal[i].abs()).sum(),
     }
 }
@@ -353,6 +365,10 @@ impl Senses {
     fn next(&mut self, touch: &PlanTouch, ready: &Ready) -> [f64; 6] {
         for name in AxisName::ALL {
             let i = name.index();
+            if ready.form.is_centre() && !name.is_rotary() {
+                self.last[i] = 0.0;
+                continue;
+            }
             let searched = ready.end.get(name) - ready.start.get(name);
             let came = self.stood.map_or(0.0, |p| ready.start.get(name) - p.get(name));
             // the search itself, else the forced sense of indexing, else the way from the last touch

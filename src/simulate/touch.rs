@@ -83,7 +83,8 @@ pub fn make(bench: &Bench<'_>, ready: &Ready) -> Outcome {
     };
     // the probe triggers that much later on the commanded line
     let shifts = at_trigger(bench, ready, &steady, |late| mapping.joints(&commanded(ready, at + late / way)));
-    let late = shifts.late + bench.dice.late_mm(ready.id);
+    // no probe triggers on a centre, but it scatters
+    let late = if ready.form.is_centre() { 0.0 } else { shifts.late } + bench.dice.late_mm(ready.id);
     let trigger = at + late / way;
     if trigger > 1.0 {
         return log(ready.end, Status::Miss, Some(Remark::Missed));
@@ -133,8 +134,11 @@ fn commanded(ready: &Ready, s: f64) -> Position {
 
 /// The frame of the real block in its carrier (origin at its centre, axes along its edges) and what it really is, mm.
 fn real_block(bench: &Bench<'_>, ready: &Ready, shifts: &Shifts) -> (Rigid, Body) {
-    let mut half = plus(plus(ready.half, shifts.half_size_ratio, ready.half), 1.0, shifts.half_size);
-    half = plus(half, 1.0, ready.longer_half);
+    let mut half = ready.half;
+    if !ready.form.is_centre() {
+        half = plus(plus(half, shifts.half_size_ratio, half), 1.0, shifts.half_size);
+        half = plus(half, 1.0, ready.longer_half);
+    }
     let mut frame = Rigid::shift(ready.centre);
     if shifts.block_outward != 0.0 {
         let outward = bench.chain.outward_from_centre(ready.n_links, ready.centre);

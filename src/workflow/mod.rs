@@ -5,6 +5,7 @@
 
 pub mod active_compensation;
 pub mod auto_program;
+pub mod centres;
 pub mod change;
 mod environment;
 pub mod examine;
@@ -14,6 +15,8 @@ pub mod history;
 pub mod join;
 mod load;
 pub mod new;
+pub mod overlay;
+pub mod own_part;
 pub mod plan_next;
 mod read_run;
 pub mod simulated_log;

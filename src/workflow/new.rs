@@ -35,12 +35,31 @@ pub struct NewStudy<'a> {
     pub runs: &'a [NewRun],
 }
 
+/// What is known of the runs of a new study beside their plans and logs.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Beside {
+    /// Standard deviation of a touch, mm.
+    pub touch_sigma_mm: Option<f64>,
+    /// Scatter of an index position, mm.
+    pub visit_sigma_mm: Option<f64>,
+    /// The mounting that all runs share.
+    pub mounting: Option<String>,
+}
+
 impl NewStudy<'_> {
     /// The text of the study.
     ///
     /// # Errors
     /// When a file is unusable or an effect is unknown.
     pub fn text(&self, machine: &Machine, env: &dyn Environment) -> Result<String> {
+        self.text_with(&Beside::default(), machine, env)
+    }
+
+    /// The same with what is known beside the runs.
+    ///
+    /// # Errors
+    /// When a file is unusable or an effect is unknown.
+    pub fn text_with(&self, beside: &Beside, machine: &Machine, env: &dyn Environment) -> Result<String> {
         let catalogue = load_effects(self.effects_files, env)?;
         effects_of(self.effects, &catalogue, machine)?;
         let mut data = Vec::new();
@@ -56,7 +75,7 @@ impl NewStudy<'_> {
                 controller: relative_controller(controller, self.folder),
                 started_s: None,
                 run: None,
-                mounting: None,
+                mounting: beside.mounting.clone(),
                 compensation: compensation.as_ref().map(|c| relative(c, self.folder)),
                 spindle: Vec::new(),
             });
@@ -68,8 +87,8 @@ impl NewStudy<'_> {
             data,
             effects: self.effects.to_vec(),
             knowledge: BTreeMap::new(),
-            touch_sigma_mm: None,
-            visit_sigma_mm: None,
+            touch_sigma_mm: beside.touch_sigma_mm,
+            visit_sigma_mm: beside.visit_sigma_mm,
             type_b: BTreeMap::new(),
             masked: Vec::new(),
             tolerance: Tolerance::default(),
@@ -78,7 +97,8 @@ impl NewStudy<'_> {
     }
 }
 
-/// What is on by default: the location errors of the machine's rotary axes, where the touched bodies stand, and the pre-travel.
+/// What is on by default: the location errors of the machine's rotary axes, where the touched bodies stand, and the pre-travel where a
+/// probe has triggered.
 #[must_use]
 pub fn default_effects(machine: &Machine, plans: &[&Plan], known_blocks: bool) -> Vec<String> {
     let mut effects: Vec<String> =
@@ -87,7 +107,10 @@ pub fn default_effects(machine: &Machine, plans: &[&Plan], known_blocks: bool) -
     if !known_blocks {
         effects.extend(set_ups_of(plans).into_iter().map(str::to_owned));
     }
-    effects.push("pretravel".into());
+    let is_centre = |p: &&Plan| !p.blocks.is_empty() && p.blocks.iter().all(|b| b.form.is_centre());
+    if plans.is_empty() || !plans.iter().all(is_centre) {
+        effects.push("pretravel".into());
+    }
     effects
 }
 
@@ -99,8 +122,9 @@ fn set_ups_of(plans: &[&Plan]) -> Vec<&'static str> {
         matches!(block.form, Form::Cylinder | Form::Bore) && matches!(Surface::of(block, touch), Surface::Plane { .. })
     };
     let all = [
-        ("block-setup", has(&[Form::Box])),
-        ("sphere-setup", has(&[Form::Sphere])),
+        ("block-setup", has(&[Form::Box, Form::Part])),
+        ("sphere-setup", has(&[Form::Sphere, Form::Centre, Form::Reading])),
+        ("reading-zero", has(&[Form::Reading])),
         ("cylinder-setup", has(&[Form::Cylinder, Form::Bore])),
         ("cylinder-height", touched().any(round)),
         ("plane-setup", has(&[Form::Plane])),

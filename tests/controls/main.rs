@@ -4,6 +4,7 @@
 mod any_machine;
 mod artefacts;
 mod beside_the_axis;
+mod centres;
 mod check;
 mod check_branches;
 mod check_programs;

@@ -6,6 +6,7 @@
 
 mod form;
 mod matching;
+pub mod poses;
 mod record;
 
 pub use form::PointsForm;
@@ -27,6 +28,8 @@ pub struct Point {
     pub number: u64,
     /// Rotations A, B, C of the record before it, deg.
     pub orientation_deg: [f64; 3],
+    /// Which record that is, from 1; 0 where there is none before it.
+    pub orientation: usize,
     /// Nominal point of the surface, as the file has it, mm.
     pub nominal: Vector3<f64>,
     /// Outward normal there, as the file has it.
@@ -155,6 +158,7 @@ fn blocks(bytes: &[u8], start: usize, form: &PointsForm, places: &Places<'_>) ->
     let mut faults = Capped::default();
     let mut before = Block { first_line: 1, ..Block::default() };
     let mut orientation = [0.0; 3];
+    let mut orientations = 0;
     let mut open: Option<(u64, Vector3<f64>, Vector3<f64>, usize)> = None;
     let lost = |number: u64, line: usize| {
         let message = format!(
@@ -195,7 +199,7 @@ fn blocks(bytes: &[u8], start: usize, form: &PointsForm, places: &Places<'_>) ->
                 }
                 // twice the same line, one behind the other, is one
                 if !in_block || !block.points.is_empty() {
-                    orientation = [0.0; 3];
+                    (orientation, orientations) = ([0.0; 3], 0);
                     blocks.push(Block { first_line: line.number, last_line: line.number, ..Block::default() });
                 }
             }
@@ -222,6 +226,7 @@ fn blocks(bytes: &[u8], start: usize, form: &PointsForm, places: &Places<'_>) ->
                     block.errors.push(lost(number, line.number));
                 }
                 orientation = angles;
+                orientations += 1;
             }
             Ok(Record::Nominal { number, point, normal }) => {
                 if let Some((number, ..)) = open.replace((number, point, normal, line.number)) {
@@ -246,6 +251,7 @@ fn blocks(bytes: &[u8], start: usize, form: &PointsForm, places: &Places<'_>) ->
                 Some((_, nominal, normal, _)) => block.points.push(Point {
                     number,
                     orientation_deg: orientation,
+                    orientation: orientations,
                     nominal,
                     normal,
                     centre: point,
