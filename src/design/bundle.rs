@@ -14,7 +14,10 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 /// Angles of an axis that swivels, deg.
-const SWIVELS_DEG: [f64; 15] =
+pub const SWIVELS_DEG: [f64; 11] = [0.0, -90.0, -75.0, -60.0, -45.0, -30.0, -15.0, 20.0, 45.0, 75.0, 90.0];
+
+/// The same with those at which most of an artefact is hidden.
+pub const SWIVELS_WIDE_DEG: [f64; 15] =
     [0.0, -90.0, -75.0, -60.0, -45.0, -30.0, -15.0, 20.0, 45.0, 75.0, 90.0, -120.0, 120.0, 150.0, 180.0];
 
 /// Angles of an axis that turns all the way, deg: no common step.
@@ -78,9 +81,9 @@ impl Bundle {
 
 /// Every bundle of a mounting that the axes' ranges allow. Collisions are for the program's own proof.
 #[must_use]
-pub fn bundles(machine: &Machine, mounting: &Mounting) -> Vec<Bundle> {
+pub fn bundles(machine: &Machine, mounting: &Mounting, swivels_deg: &[f64]) -> Vec<Bundle> {
     let mut out = Vec::new();
-    for manner in manners(machine) {
+    for manner in manners(machine, swivels_deg) {
         let with_it = match &manner.stylus {
             None => Some(machine.clone()),
             Some(name) => machine.with_stylus(name),
@@ -97,12 +100,12 @@ pub fn bundles(machine: &Machine, mounting: &Mounting) -> Vec<Bundle> {
 }
 
 /// Poses and ways to touch: all angles of each axis with all of the other, and the variations of the probe at a few.
-fn manners(machine: &Machine) -> Vec<Manner> {
+fn manners(machine: &Machine, swivels_deg: &[f64]) -> Vec<Manner> {
     let rotary: Vec<(AxisName, Vec<f64>)> = machine
         .rotary()
         .map(|a| {
             let [low, high] = a.range;
-            let angles: &[f64] = if high - low >= 350.0 { &TURNS_DEG } else { &SWIVELS_DEG };
+            let angles: &[f64] = if high - low >= 350.0 { &TURNS_DEG } else { swivels_deg };
             (a.name, angles.iter().copied().filter(|x| (low..=high).contains(x)).collect())
         })
         .collect();

@@ -2,7 +2,7 @@
 
 use super::new::default_effects;
 use crate::design::auto_plan::{Choice, choose};
-use crate::design::bundle::{Bundle, Head, VisitOf, as_plan, bundles, program_text, without};
+use crate::design::bundle::{Bundle, Head, SWIVELS_WIDE_DEG, VisitOf, as_plan, bundles, program_text, without};
 use crate::design::{LinearisedPlan, Noise, Planned, Task};
 use crate::diag::{Failure, Result, source};
 use crate::fit::effects_of;
@@ -72,7 +72,7 @@ pub fn auto_program(
         let head = Head { by: "generate --program auto", name: "auto", says: &says, again: &choice.again };
         program_text(machine, mounting, &head, pool, &choice.chosen)
     };
-    let mut pool = bundles(machine, mounting);
+    let mut pool = bundles(machine, mounting, &SWIVELS_WIDE_DEG);
     let mut scale = 1.0;
     let mut best: Option<(f64, String)> = None;
     let mut worst = f64::INFINITY;
@@ -150,7 +150,7 @@ fn better_place(
         let by_mm = Vector3::new(foot.x + x - first.centre.x, foot.y + y - first.centre.y, up);
         let mut moved = mounting.clone();
         moved.blocks.iter_mut().for_each(|b| b.centre += by_mm);
-        let pool = bundles(machine, &moved);
+        let pool = bundles(machine, &moved, &SWIVELS_WIDE_DEG);
         if pool.is_empty() {
             continue;
         }

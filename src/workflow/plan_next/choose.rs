@@ -1,6 +1,6 @@
 //! Which touches of which blocks: chosen, proven to be reachable, and what they will tell.
 
-use crate::design::bundle::{Bundle, Head, Manner, VisitOf, as_plan, bundles, program_text, without};
+use crate::design::bundle::{Bundle, Head, Manner, SWIVELS_DEG, VisitOf, as_plan, bundles, program_text, without};
 use crate::design::choose_touches::{Design, Separation, where_all_have_values};
 use crate::design::questions::{Pair, Questions};
 use crate::design::{Known, LinearisedPlan, Noise, Planned, Room, Task};
@@ -181,7 +181,7 @@ impl<'a> Setting<'a> {
     ) -> Result<Chosen> {
         let machine = self.task.machine;
         let nothing = || Failure::new("next::nothing", "nothing can be touched");
-        let mut pool = bundles(machine, mounting);
+        let mut pool = bundles(machine, mounting, &SWIVELS_DEG);
         let mut scale = 1.0;
         let mut found: Option<Chosen> = None;
         for _ in 0..MOST_ROUNDS {
