@@ -47,6 +47,8 @@ pub struct TouchState {
     pub normal_carrier: Vec3,
     /// Down, unit vector in the carrier's frame.
     pub down_carrier: Vec3,
+    /// What is touched is round: it stands on a stem.
+    pub on_stem: bool,
     /// Planned contact in the carrier's frame, mm.
     pub point: Vec3,
     /// Unit vector from the carrier's centre line to the block's centre, in the carrier's frame; 0 on it.
@@ -81,6 +83,7 @@ impl Default for TouchState {
             normal_probe: [0.0; 3],
             normal_carrier: [0.0; 3],
             down_carrier: [0.0, 0.0, -1.0],
+            on_stem: false,
             point: [0.0; 3],
             outward: [0.0; 3],
             edge_mm: 0.0,
@@ -180,9 +183,9 @@ pub enum Shape {
     FormCosine(i32),
     /// sᵏ·sin(k·φ).
     FormSine(i32),
-    /// How far the ball pushes its body along an axis of the carrier: the part of the push, against the normal.
+    /// How far the ball pushes a body on a stem along an axis of the carrier: the part of the push, against the normal.
     Push(usize),
-    /// The part of gravity along an axis of the carrier.
+    /// The part of gravity along an axis of the carrier, for a body on a stem.
     CarrierGravity(usize),
     /// Feed, mm/s.
     Feed,
@@ -263,6 +266,7 @@ impl Shape {
             Self::LobeSine(k) => lobe(touch.approach_probe, k).0,
             Self::FormCosine(k) => form_lobe(touch.normal_carrier, k).1,
             Self::FormSine(k) => form_lobe(touch.normal_carrier, k).0,
+            Self::Push(_) | Self::CarrierGravity(_) if !touch.on_stem => 0.0,
             Self::Push(i) => -touch.normal_carrier[i],
             Self::CarrierGravity(i) => touch.down_carrier[i],
             Self::Feed => mm_s_from_mm_min(touch.feed_mm_min),

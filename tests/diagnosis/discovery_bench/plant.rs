@@ -4,7 +4,8 @@
 use axiscal::diag::source;
 use axiscal::log::Touch;
 use axiscal::machine::Machine;
-use axiscal::model::catalogue::Catalogue;
+use axiscal::model::catalogue::{Catalogue, Effect};
+use axiscal::model::surface::Body;
 use axiscal::program::plan::Plan;
 use axiscal::simulate::{self, Scenario};
 use rand::RngExt;
@@ -185,9 +186,10 @@ pub fn ids(machine: &Machine) -> Vec<String> {
     let catalogue = Catalogue::built_in().unwrap();
     let base = ["location-b", "location-c", "block-setup", "pretravel", "sign-or-axis-swap"];
     // what differs from run to run cannot be written once for all runs: tests/discovery plants it
+    let of_blocks = |e: &&Effect| e.of.is_empty() || e.of.contains(&Body::Box);
     let ids =
         catalogue.iter().filter(|e| e.applies_to(machine) && !e.paper && !e.per_run && !base.contains(&e.id.as_str()));
-    ids.map(|e| e.id.clone()).collect()
+    ids.filter(of_blocks).map(|e| e.id.clone()).collect()
 }
 
 /// An effect in a random direction, in the catalogue's own shape (a scanned number anywhere in its usual range).
