@@ -8,8 +8,9 @@ use axiscal::diagnose::solving::{self, Added, Change, Ending, Host, Request, Sta
 use axiscal::diagnose::{Options, Subject, diagnose};
 use axiscal::fit::{self, Settings};
 use axiscal::machine::Machine;
-use axiscal::model::catalogue::Catalogue;
+use axiscal::model::catalogue::{Catalogue, Effect};
 use axiscal::model::data::{Data, Run, assemble};
+use axiscal::model::surface::Body;
 use axiscal::program::plan::Plan;
 use axiscal::simulate::scenario;
 use common::verbs::{json, ok};
@@ -63,7 +64,8 @@ impl Bench {
         plan.touches.retain(|t| t.id % 2 == 0);
         let catalogue = Catalogue::built_in().unwrap();
         let can_act = |id: &str| !BASE.contains(&id) && id != "sign-or-axis-swap";
-        let acting = catalogue.acting_on(&machine).filter(|e| !e.paper && can_act(&e.id));
+        let of_blocks = |e: &Effect| e.of.is_empty() || e.of.contains(&Body::Box);
+        let acting = catalogue.acting_on(&machine).filter(|e| !e.paper && can_act(&e.id) && of_blocks(e));
         let ids = acting.map(|e| e.id.clone()).collect();
         Self { machine, plan, catalogue, ids }
     }
