@@ -98,9 +98,9 @@ fn three(word: &str) -> Option<[f64; 3]> {
 
 impl Stated {
     /// Takes a remark of the head: `key = value`. Other remarks are for people.
-    pub(super) fn take(&mut self, remark: &[u8], range: Range<usize>, source: &Source, findings: &mut Findings) {
-        let remark = String::from_utf8_lossy(remark);
-        let Some((key, value)) = remark.split_once(['=', ':']) else { return };
+    pub(super) fn take(&mut self, line: &[u8], range: Range<usize>, source: &Source, findings: &mut Findings) {
+        let line = String::from_utf8_lossy(line);
+        let Some((key, value)) = line.split_once(['=', ':']) else { return };
         let (key, value) = (key.trim().to_ascii_lowercase().replace('-', "_"), value.trim());
         let number = || value.parse::<f64>().ok().filter(|x| x.is_finite() && *x > 0.0);
         let is_good = match key.as_str() {
