@@ -97,6 +97,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     post.dry_run_mm = dry_run_mm(args.dry_run_height)?;
     let plan_file = args.out.join(format!("{}.plan.json", spec.name));
     keep_other_plans(&plan_file, &machine, &spec)?;
+    if mounted.is_some() {
+        keep_other_machines(&args.out.join(MACHINES))?;
+    }
     let options = Options { strict: args.strict, tcp: args.tcp };
     let ForControl { mut generated, nc, proof, seconds } = generate(&machine, &spec, &post, &options, &Summarised(io))?;
 
@@ -124,7 +127,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         io.report(&[crate::words::generate::badly_placed(better)]);
     }
     if auto.is_some() {
-        io.say(format!("{AUTO}.toml holds the chosen touches: it can be edited and used with --program FILE"));
+        io.say(format!(
+            "{AUTO}.toml holds the chosen touches: to change them, edit a copy of it and use that with --program FILE"
+        ));
     }
     if mounted.is_some() {
         let file = super::next::quoted(&args.out.join(MACHINES));
@@ -198,6 +203,15 @@ fn old_programs(file: &Path, plan: &Plan) -> Option<BTreeMap<String, Proof>> {
     let (old, _) = Plan::parse(&source(file.display().to_string(), text)).ok()?;
     let same = Plan { programs: BTreeMap::new(), ..old.clone() }.to_json() == plan.to_json();
     same.then_some(old.programs)
+}
+
+/// Refuses to write over a machines file of the user's own.
+fn keep_other_machines(file: &Path) -> Result<()> {
+    if !file.exists() || artefact::is_our_own(&String::from_utf8_lossy(&files::read_own(file)?)) {
+        return Ok(());
+    }
+    let says = format!("{} exists and is a file of yours: it is not written over", file.display());
+    Err(Failure::new("cli::other_machines", says).help("name another folder with --out"))
 }
 
 /// Refuses to write over the plan of another machine or program, or over something that is no plan.

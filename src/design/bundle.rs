@@ -174,6 +174,12 @@ fn bundle(machine: &Machine, manner: &Manner, block: &Block) -> Bundle {
             bundle.touches.extend(all);
         }
     }
+    // a hole that the ball does not go into is not touched
+    let too_narrow = block.form == Form::Bore
+        && block.diameter.unwrap_or_default() / 2.0 <= machine.probe.ball_radius + machine.probe.clearance;
+    if too_narrow {
+        return bundle;
+    }
     let turned = ring_points::to_carrier(machine, block, SPHERE_IN, &at);
     for (azimuth_deg, along) in ring(block) {
         let Ok(p) = ring_points::place(block, azimuth_deg, along, &turned) else { continue };

@@ -11,6 +11,23 @@ use toml_edit::{ArrayOfTables, DocumentMut, Item, Table, value};
 /// The format line of an artefact.
 pub const FORMAT: &str = "axiscal-artefacts/1";
 
+/// How a machines file begins that an artefact was written into.
+const WRITTEN: &str = "# written by `axiscal generate`";
+
+/// Was a machines file written here? Then it may be written again.
+#[must_use]
+pub fn is_our_own(text: &str) -> bool {
+    text.starts_with(WRITTEN)
+}
+
+/// A text without the line that says so.
+fn without_mark(text: &str) -> &str {
+    match text.split_once('\n') {
+        Some((first, rest)) if is_our_own(first) => rest,
+        _ => text,
+    }
+}
+
 /// The artefacts that are built in: name and text.
 pub const BUILT_IN: [(&str, &str); 5] = [
     ("sphere", include_str!("../../artefacts/sphere.toml")),
@@ -132,7 +149,7 @@ pub fn mount(machines: &Source, machine: &Machine, artefact: &Source) -> Result<
             all.push(mounting);
         }
     }
-    let text = doc.to_string();
+    let text = format!("{WRITTEN}: {} with {name:?}\n{}", machine.name, without_mark(&doc.to_string()));
     let (mut machines, findings) = load(&source(format!("{} on {}", artefact.name(), machine.name), text.clone()))?;
     let machine = machines.pop().ok_or_else(|| Failure::new("machine::unknown", "the machine is gone"))?;
     Ok((WithArtefact { text, machine, mounting: name }, findings))
@@ -179,14 +196,22 @@ fn mounting(file: &File, machine: &Machine, artefact: &Source) -> Result<Table> 
                 let centre = (0..3).map(|i| ((origin[i] + at[i]) * 1e6).round() / 1e6);
                 written.insert("centre", value(centre.collect::<toml_edit::Array>()));
             }
-            written.set_position(None);
         }
     }
-    if let Some(solids) = table.get_mut("solid").and_then(Item::as_array_of_tables_mut) {
-        solids.iter_mut().for_each(|s| s.set_position(None));
-    }
-    table.set_position(None);
+    without_positions(&mut table);
     Ok(table)
+}
+
+/// Tables of another file have their places there: here they follow their parents.
+fn without_positions(table: &mut Table) {
+    table.set_position(None);
+    for (_, item) in table.iter_mut() {
+        match item {
+            Item::Table(inner) => without_positions(inner),
+            Item::ArrayOfTables(inner) => inner.iter_mut().for_each(without_positions),
+            _ => {}
+        }
+    }
 }
 
 #[cfg(test)]
@@ -209,6 +234,7 @@ mod tests {
                 // the same once more: it replaces the one that is there
                 let (twice, _) = mount(&source("again", with.text), &with.machine, &source(name, text)).unwrap();
                 assert_eq!(twice.machine.mountings.len(), with.machine.mountings.len());
+                assert!(is_our_own(&twice.text) && twice.text.matches(WRITTEN).count() == 1);
             }
         }
         let trunnion = machines.iter().find(|m| m.name == "trunnion").unwrap();
@@ -216,6 +242,19 @@ mod tests {
         let ball = &with.machine.mounting("sphere").unwrap().blocks[0];
         let above = ball.centre - trunnion.reference.table;
         assert!((above - nalgebra::Vector3::new(60.0, 0.0, 92.5)).norm() < 1e-9, "{above:?}");
+    }
+
+    #[test]
+    fn a_stem_that_is_a_table_of_its_own_stays_with_its_sphere() {
+        let all = source("machines.toml", super::super::BUILT_IN);
+        let (machines, _) = load(&all).unwrap();
+        let trunnion = machines.iter().find(|m| m.name == "trunnion").unwrap();
+        let inline = "riser = { height = 80.0, diameter = 12.0 }  # the stem with its base";
+        assert!(BUILT_IN[0].1.contains(inline));
+        let text = BUILT_IN[0].1.replace(inline, "[block.riser]\nheight = 80.0\ndiameter = 12.0");
+        let (with, _) = mount(&all, trunnion, &source("mine.toml", text)).unwrap();
+        let riser = with.machine.mounting("sphere").unwrap().blocks[0].riser.unwrap();
+        assert_eq!((riser.height, riser.diameter), (80.0, Some(12.0)));
     }
 
     #[test]

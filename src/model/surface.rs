@@ -119,13 +119,13 @@ impl Surface {
             Self::Sphere { centre, radius } => {
                 let arm = q - centre;
                 let length = arm.norm();
-                (length - radius - ball_radius_mm, arm / length)
+                (length - radius - ball_radius_mm, arm / length.max(f64::MIN_POSITIVE))
             }
             Self::Cylinder { centre, radius, sense } => {
                 let mut arm = q - centre;
                 arm.z = 0.0;
                 let length = arm.norm();
-                (sense * (length - radius) - ball_radius_mm, arm * (*sense / length))
+                (sense * (length - radius) - ball_radius_mm, arm * (*sense / length.max(f64::MIN_POSITIVE)))
             }
         }
     }

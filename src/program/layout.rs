@@ -4,7 +4,7 @@
 use super::as_written::{FacesIn, RingIn};
 use super::parts::Part;
 use super::ring_points;
-use super::spec::{Across, At, Face, FaceGrid, MOST_TOUCHES, ProgramSpec, RingPoints, SetupSpec};
+use super::spec::{Across, Along, At, Face, FaceGrid, MOST_TOUCHES, ProgramSpec, RingPoints, SetupSpec};
 use crate::axes::{AxisMap, Position};
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::{Block, Form, Machine, Mounting};
@@ -321,7 +321,20 @@ impl Check<'_> {
         let mut out = Vec::new();
         for &(azimuth_deg, along) in &ring.points {
             match ring_points::place(block, azimuth_deg, along, to_carrier) {
-                Ok(p) => out.push(Target { block: b, face: p.label, point: p.point, normal: p.normal }),
+                Ok(p) => {
+                    let tolerance = self.machine.probe.placement_tolerance;
+                    if let Along::Depth(mm) = along
+                        && mm.min(block.size.z - mm) < tolerance
+                    {
+                        let says = format!("ring {:?} comes within {tolerance} mm of an end", ring.name.value);
+                        let help = format!(
+                            "block {:?} may stand {tolerance} mm from its place: the ball can then miss its wall",
+                            block.name
+                        );
+                        self.push_once_per_place(self.spec.error(&ring.name.span, "program::near_edge", says, help));
+                    }
+                    out.push(Target { block: b, face: p.label, point: p.point, normal: p.normal });
+                }
                 Err(reason) => {
                     let says = format!("ring {:?} does not fit block {:?}: {reason}", ring.name.value, block.name);
                     let help = format!("block {:?} is a {}", block.name, block.form.as_str());

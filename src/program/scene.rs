@@ -121,15 +121,26 @@ impl Solid {
             (own > from && own < to).then_some(at)
         };
         (0..WEDGES)
-            .filter_map(|k| {
+            .map(|k| {
                 let (a, b) = (direction(k), direction(k + 1));
                 let mut flat = vec![a * radius, b * radius, border(&a), border(&b)];
-                flat.extend(corner(&a, &b));
+                // a corner that lies on a ray of the wedge is there already
+                let far = |at: &Vector3<f64>, b: &Vector3<f64>| (at - b).norm() > 1e-6;
+                flat.extend(corner(&a, &b).filter(|at| far(at, &border(&a)) && far(at, &border(&b))));
                 let points: Vec<Vec3> =
                     flat.iter().flat_map(|p| [-half.z, half.z].map(|z| Vec3::new(p.x, p.y, p.z + z))).collect();
                 let reach = flat.iter().map(|p| p.norm().hypot(half.z)).fold(0.0, f64::max);
-                let shape = SharedShape::convex_hull(&points)?;
-                Some(Self::new(shape, Translation3::from(centre).into(), reach))
+                match SharedShape::convex_hull(&points) {
+                    Some(shape) => Self::new(shape, Translation3::from(centre).into(), reach),
+                    // the box that holds the wedge: no piece of the body may be missing
+                    None => {
+                        let low = flat.iter().fold(Vector3::repeat(f64::MAX), |m, p| m.inf(p));
+                        let high = flat.iter().fold(Vector3::repeat(f64::MIN), |m, p| m.sup(p));
+                        let size = Vector3::new(high.x - low.x, high.y - low.y, size.z);
+                        let middle = (low + high) / 2.0;
+                        Self::cuboid(centre + Vector3::new(middle.x, middle.y, 0.0), size)
+                    }
+                }
             })
             .collect()
     }

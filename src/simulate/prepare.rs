@@ -331,6 +331,7 @@ fn state(
         outward: chain.outward_from_centre(n_links, block.centre),
         edge_mm: edge_mm(block, normal),
         on_stem: matches!(block.form, Form::Sphere | Form::Cylinder | Form::Bore),
+        hangs: !matches!(block.form, Form::Box | Form::Plane | Form::Part),
         down_carrier: from.carrier.inward_direction([0.0, 0.0, -1.0]),
         label: if mounting.is_empty() {
             touch.block.as_str().into()

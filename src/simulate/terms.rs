@@ -49,6 +49,8 @@ pub struct TouchState {
     pub down_carrier: Vec3,
     /// What is touched is round: it stands on a stem.
     pub on_stem: bool,
+    /// It stands on a stem, whatever measured it.
+    pub hangs: bool,
     /// Planned contact in the carrier's frame, mm.
     pub point: Vec3,
     /// Unit vector from the carrier's centre line to the block's centre, in the carrier's frame; 0 on it.
@@ -84,6 +86,7 @@ impl Default for TouchState {
             normal_carrier: [0.0; 3],
             down_carrier: [0.0, 0.0, -1.0],
             on_stem: false,
+            hangs: false,
             point: [0.0; 3],
             outward: [0.0; 3],
             edge_mm: 0.0,
@@ -266,7 +269,8 @@ impl Shape {
             Self::LobeSine(k) => lobe(touch.approach_probe, k).0,
             Self::FormCosine(k) => form_lobe(touch.normal_carrier, k).1,
             Self::FormSine(k) => form_lobe(touch.normal_carrier, k).0,
-            Self::Push(_) | Self::CarrierGravity(_) if !touch.on_stem => 0.0,
+            Self::Push(_) if !touch.on_stem => 0.0,
+            Self::CarrierGravity(_) if !touch.hangs => 0.0,
             Self::Push(i) => -touch.normal_carrier[i],
             Self::CarrierGravity(i) => touch.down_carrier[i],
             Self::Feed => mm_s_from_mm_min(touch.feed_mm_min),

@@ -136,7 +136,9 @@ fn commanded(ready: &Ready, s: f64) -> Position {
 fn real_block(bench: &Bench<'_>, ready: &Ready, shifts: &Shifts) -> (Rigid, Body) {
     let mut half = ready.half;
     if !ready.form.is_centre() {
-        half = plus(plus(half, shifts.half_size_ratio, half), 1.0, shifts.half_size);
+        half = plus(half, shifts.half_size_ratio, half);
+        // edges are those of blocks
+        half = plus(half, f64::from(ready.form == Form::Box), shifts.half_size);
         half = plus(half, 1.0, ready.longer_half);
     }
     let mut frame = Rigid::shift(ready.centre);

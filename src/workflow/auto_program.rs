@@ -107,6 +107,10 @@ pub fn auto_program(
                 of.iter().filter_map(same).collect()
             };
             let kept = Choice { chosen: again(&choice.chosen), again: again(&choice.again), worst: choice.worst };
+            if kept.chosen.is_empty() {
+                pool = left;
+                continue;
+            }
             text = write(&left, &kept);
             pool = left;
         }
@@ -121,11 +125,8 @@ pub fn auto_program(
     }
     let nothing = || {
         why.unwrap_or_else(|| {
-            Failure::new(
-                "auto::nothing",
-                format!("nothing of {:?} can be touched within {minutes} minutes", mounting.name),
-            )
-            .help("more minutes (--minutes), or another place for the artefact")
+            Failure::new("auto::nothing", format!("no program for {:?} fits into {minutes} minutes", mounting.name))
+                .help("more minutes (--minutes), or another place for the artefact")
         })
     };
     let (_, text) = best.ok_or_else(nothing)?;

@@ -101,6 +101,12 @@ fn a_machine_is_a_template_and_an_artefact_a_file() {
     let again = ["--program", "job/auto.toml", "--controller", "linuxcnc", "--out", "again"];
     ok(at, &[&["generate", "--machine", "trunnion", "--machines", "job/machines.toml"][..], &again].concat());
     assert_eq!(std::fs::read(at.join("job/auto.ngc")).unwrap(), std::fs::read(at.join("again/auto.ngc")).unwrap());
+    // a machines file of the user's own is not written over
+    std::fs::create_dir(at.join("own")).unwrap();
+    std::fs::copy(at.join("mine.toml"), at.join("own/machines.toml")).unwrap();
+    let out = axiscal(at, &[&["generate"][..], &auto, &["--machine", "trunnion", "--out", "own"]].concat());
+    assert_eq!(out.status.code(), Some(2), "{}", String::from_utf8_lossy(&out.stderr));
+    assert_eq!(std::fs::read(at.join("own/machines.toml")).unwrap(), std::fs::read(at.join("mine.toml")).unwrap());
     for (words, code) in [(["--artefact", "bell"], "artefact::unknown"), (["--minutes", "0"], "auto::minutes")] {
         let out = axiscal(
             at,
