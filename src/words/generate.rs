@@ -4,7 +4,7 @@ use crate::diag::Finding;
 use crate::units::Plain;
 use crate::workflow::auto_program::BetterPlace;
 
-/// An artefact that hardly sees one of the machine's errors.
+/// An artefact at a place where one of the machine's errors can hardly be measured.
 #[must_use]
 pub fn badly_placed(better: &BetterPlace) -> Finding {
     let by: Vec<String> = ["X", "Y", "Z"]
@@ -16,8 +16,8 @@ pub fn badly_placed(better: &BetterPlace) -> Finding {
     Finding::warning(
         "auto::place",
         format!(
-            "the artefact stands where it hardly sees one of the errors: its standard uncertainty is {:.1} times the usual size of \
-             that error",
+            "with the artefact at this place one of the errors can hardly be measured: its standard uncertainty is {:.1} times the \
+             usual size of that error",
             better.worst
         ),
     )

@@ -68,7 +68,7 @@ pub fn generate(
             let mut plain = post.clone();
             plain.without_dry_run = true;
             let without = written(&plain).map_err(|_: Failure| failure)?;
-            let says = "the program has no dry run: lifted, its moves would meet something";
+            let says = "the program has no dry run: its moves are not clear of everything when they are lifted";
             env.remark(&[
                 Finding::warning("generate::no_dry_run", says).help("run it at a low feed override the first time")
             ]);
