@@ -349,10 +349,10 @@ pub fn cost_s(pool: &[Bundle], chosen: &[usize]) -> f64 {
 pub fn program_text(machine: &Machine, mounting: &Mounting, head: &Head, pool: &[Bundle], chosen: &[usize]) -> String {
     let Head { by, name, says, again } = head;
     let mut text = format!(
-        "# chosen by `axiscal {by}`\nformat = \"{FORMAT}\"\nname = \"{name}\"\nmachine = \"{}\"\nsays = {}\nmounting = \"{}\"\nfaces_in = \"block\"\n",
-        machine.name,
+        "# chosen by `axiscal {by}`\nformat = \"{FORMAT}\"\nname = \"{name}\"\nmachine = {}\nsays = {}\nmounting = {}\nfaces_in = \"block\"\n",
+        toml_edit::value(&machine.name),
         toml_edit::value(*says),
-        mounting.name
+        toml_edit::value(&mounting.name)
     );
     let mut shapes = Shapes::default();
     let mut body = String::new();
@@ -439,7 +439,7 @@ fn setup_text(mounting: &Mounting, bundle: &Bundle, blocks: &[&str], shapes: &mu
     let manner = &bundle.manner;
     let pose: Vec<String> = manner.pose.iter().map(|(a, x)| format!("{a} = {}", decimal(x))).collect();
     let from: Vec<String> = manner.from.iter().map(|(a, x)| format!("{a} = {x:.0}")).collect();
-    let blocks: Vec<String> = blocks.iter().map(|b| format!("\"{b}\"")).collect();
+    let blocks: Vec<String> = blocks.iter().map(|b| toml_edit::value(*b).to_string()).collect();
     let block = mounting.blocks.iter().find(|b| b.name == bundle.block);
     let mut groups = Vec::new();
     for side in [false, true] {
