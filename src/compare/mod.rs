@@ -2,6 +2,7 @@
 //!
 //! [`compare`] is a pure function of a fit. What it returns is what the terminal, the report and the workbench draw.
 
+pub mod by_direction;
 pub mod change;
 mod factors;
 pub mod model_ladder;

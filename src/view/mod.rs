@@ -12,7 +12,7 @@ pub mod record;
 mod touches;
 
 pub use headline::{Headline, Level};
-pub use next::Next;
+pub use next::{Act, Next};
 pub use parameters::{correlation, results};
 pub use record::View;
 
@@ -43,7 +43,7 @@ pub struct RunFiles<'a> {
     pub touches: &'a Plan,
 }
 
-/// Everything that a view is made from.
+/// What the verdict and the steps are made from.
 #[derive(Debug, Clone, Copy)]
 pub struct Material<'a> {
     /// The study's file name, as a user would type it.
@@ -62,24 +62,47 @@ pub struct Material<'a> {
     pub fit: &'a Fit,
     /// The fit with what the diagnosis proposes.
     pub proposed: Option<&'a Fit>,
-    /// Where it fails.
-    pub comparison: &'a Comparison,
     /// What is missing.
     pub diagnosis: &'a Diagnosis,
-    /// The models on these touches.
-    pub ladder: &'a Ladder,
     /// What a compensation would carry, or why none can be made.
     pub correction: Result<&'a Correction, &'a str>,
 }
 
-/// Puts a view together.
+/// Everything that a view is made from.
+#[derive(Debug, Clone, Copy)]
+pub struct ViewMaterial<'a> {
+    pub verdict: Material<'a>,
+    /// Where the model fails.
+    pub comparison: &'a Comparison,
+    /// The models on these touches.
+    pub ladder: &'a Ladder,
+}
+
+impl<'a> std::ops::Deref for ViewMaterial<'a> {
+    type Target = Material<'a>;
+
+    fn deref(&self) -> &Material<'a> {
+        &self.verdict
+    }
+}
+
+/// The verdict in words and what to do about it, the first thing first.
 #[must_use]
-pub fn gather(m: &Material) -> View {
-    let fit = m.fit;
-    let parameters = parameters::parameters(m, fit);
+pub fn verdict_and_steps(m: &Material) -> (Headline, Vec<Next>) {
+    let parameters = parameters::parameters(m, m.fit);
     let compensation = parameters::compensation(m);
     let headline = headline::headline(m, &parameters, &compensation);
     let next = next::next(m, &headline, &parameters, &compensation);
+    (headline, next)
+}
+
+/// Puts a view together.
+#[must_use]
+pub fn gather(m: &ViewMaterial) -> View {
+    let fit = m.fit;
+    let parameters = parameters::parameters(m, fit);
+    let compensation = parameters::compensation(m);
+    let (headline, next) = verdict_and_steps(m);
     let at = |kind: Kind| m.ladder.rungs.iter().position(|r| r.kind == kind);
     let (before, after) = match (at(Kind::Current), at(Kind::Proposed)) {
         (Some(current), Some(proposed)) => (current, proposed),

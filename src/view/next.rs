@@ -21,11 +21,33 @@ pub struct Next {
     pub how: String,
     /// What to type; empty where nothing is typed.
     pub command: String,
+    /// What the workbench does about it when it is asked to.
+    pub act: Act,
+}
+
+/// What the workbench can do itself.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(tag = "do", rename_all = "kebab-case")]
+pub enum Act {
+    /// A person does it, at the machine or in the terminal.
+    Nothing,
+    /// Adds the effect to the model.
+    Add { effect: String },
+    /// Writes a program of further touches.
+    MeasureMore,
+    /// Writes the compensation.
+    Export,
+    /// Writes a starting formula.
+    Sketch,
 }
 
 impl Next {
     fn new(what: impl Into<String>, how: impl Into<String>, command: impl Into<String>) -> Self {
-        Self { what: what.into(), how: how.into(), command: command.into() }
+        Self { what: what.into(), how: how.into(), command: command.into(), act: Act::Nothing }
+    }
+
+    fn with(self, act: Act) -> Self {
+        Self { act, ..self }
     }
 }
 
@@ -58,7 +80,7 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
                     "Measure more touches",
                     "Repeats and further poses show whether the weak pattern is real.",
                     plan_next.clone(),
-                ));
+                ).with(Act::MeasureMore));
                 // what could be wrong by more than its tolerance would be refused
                 let within =
                     |c: &Consequence| m.tolerance.limit(&c.parameter, &c.unit).is_none_or(|limit| c.off <= limit);
@@ -70,7 +92,7 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
             (_, true) => {
                 let what = d.in_question().map_or_else(|| "one of these effects".to_owned(), |c| in_question(m, c));
                 let how = format!("Touches at further poses show whether it is {what}.");
-                out.push(Next::new("Measure more index positions", how, plan_next.clone()));
+                out.push(Next::new("Measure more index positions", how, plan_next.clone()).with(Act::MeasureMore));
             }
             (_, false) => unexplained(m, u, &mut out),
         },
@@ -85,7 +107,7 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
     if !m.fit.outcome.undetermined.is_empty() && (d.verdict == Verdict::Adequate || d.verdict.is_weak_pattern()) {
         let how = m.fit.outcome.undetermined.iter().flat_map(|u| u.parted_by.first()).next();
         let how = how.map_or_else(|| "A program that measures what these touches cannot.".to_owned(), Clone::clone);
-        out.push(Next::new("Measure what cannot be determined yet", capital(&how), plan_next));
+        out.push(Next::new("Measure what cannot be determined yet", capital(&how), plan_next).with(Act::MeasureMore));
     }
     odd_touches(m, &mut out);
     out
@@ -98,11 +120,14 @@ fn which(m: &Material, open: &[String], plan_next: &str, controller: &str, out: 
     if open.len() > MOST {
         names.push(format!("{} more", open.len() - MOST));
     }
-    out.push(Next::new(
-        "Measure further poses",
-        format!("The touches that show most of what may be missing: {}.", names.join("; ")),
-        plan_next,
-    ));
+    out.push(
+        Next::new(
+            "Measure further poses",
+            format!("The touches that show most of what may be missing: {}.", names.join("; ")),
+            plan_next,
+        )
+        .with(Act::MeasureMore),
+    );
     out.push(Next::new(
         "Or run the full program",
         "It has the poses in which every known effect shows, and some to confirm the answer.",
@@ -118,13 +143,17 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
     }
     if !first.same_as.is_empty() {
         let command = if first.never_parted { "" } else { plan_next };
-        out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), command));
+        let act = if first.never_parted { Act::Nothing } else { Act::MeasureMore };
+        out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), command).with(act));
     }
-    out.push(Next::new(
-        "Add it to the model",
-        "The error falls and the other values become right. This page then shows the next step.",
-        format!("axiscal add {} {}", m.study, first.effect),
-    ));
+    out.push(
+        Next::new(
+            "Add it to the model",
+            "The error falls and the other values become right. This page then shows the next step.",
+            format!("axiscal add {} {}", m.study, first.effect),
+        )
+        .with(Act::Add { effect: first.effect.clone() }),
+    );
     let mends = m.catalogue.get(&first.effect, m.machine).map_or("", |e| e.mends.as_str());
     if !mends.is_empty() {
         out.push(Next::new("How to correct it", format!("{one_of_several}{mends}"), ""));
@@ -173,11 +202,14 @@ fn unexplained(m: &Material, found: &Unexplained, out: &mut Vec<Next>) {
     if !found.sketchable {
         return;
     }
-    out.push(Next::new(
-        "Write it as a formula",
-        "A starting formula for what no known effect explains. Then add it to the model.",
-        format!("axiscal sketch-effect {} --out my-effects.toml", m.study),
-    ));
+    out.push(
+        Next::new(
+            "Write it as a formula",
+            "A starting formula for what no known effect explains. Then add it to the model.",
+            format!("axiscal sketch-effect {} --out my-effects.toml", m.study),
+        )
+        .with(Act::Sketch),
+    );
 }
 
 fn settled(
@@ -212,11 +244,14 @@ fn settled(
         ));
     }
     if beyond.is_empty() && parameters.iter().any(|p| p.judgement == Judgement::Open) {
-        out.push(Next::new(
-            "Measure more touches",
-            "The uncertainty is too large for this tolerance. Repeats and further poses reduce it.",
-            format!("axiscal plan-next {} --controller {controller} --out next", m.study),
-        ));
+        out.push(
+            Next::new(
+                "Measure more touches",
+                "The uncertainty is too large for this tolerance. Repeats and further poses reduce it.",
+                format!("axiscal plan-next {} --controller {controller} --out next", m.study),
+            )
+            .with(Act::MeasureMore),
+        );
     }
 }
 
@@ -239,11 +274,14 @@ fn compensate(m: &Material, parameters: &[ParameterRecord], c: &Compensation, ou
         how += " With --backup FILE, the control's own backup, its present values are added to; without it a sheet lists by how much each value changes.";
     }
     let flag = if accepts.is_empty() { "" } else { " --accept-unverified" };
-    out.push(Next::new(
-        "Load the compensation",
-        how,
-        format!("axiscal export {} --controller {controller} --out compensation{flag}", m.study),
-    ));
+    out.push(
+        Next::new(
+            "Load the compensation",
+            how,
+            format!("axiscal export {} --controller {controller} --out compensation{flag}", m.study),
+        )
+        .with(Act::Export),
+    );
     out.push(Next::new(
         "Measure again and compare",
         "Run the same program with the compensation loaded. Comparing the two studies shows whether it works.",

@@ -2,7 +2,7 @@
 //!
 //! Touches stand column by column, because there may be ten thousand of them and the page that holds them is mailed.
 
-use super::Material;
+use super::ViewMaterial;
 use super::headline::Headline;
 use super::next::Next;
 use crate::compare::Split;
@@ -410,7 +410,7 @@ pub struct Variable {
 }
 
 /// The diagnosis with the words of the catalogue.
-pub(super) fn diagnosis(m: &Material) -> DiagnosisRecord {
+pub(super) fn diagnosis(m: &ViewMaterial) -> DiagnosisRecord {
     let d = m.diagnosis;
     let mut ids: Vec<&str> = m.fit.outcome.effects.iter().map(String::as_str).collect();
     for c in &d.candidates {

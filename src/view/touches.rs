@@ -1,6 +1,6 @@
 //! Touches column by column, the rungs of the ladder without them, and what they are drawn against.
 
-use super::Material;
+use super::ViewMaterial;
 use super::record::{RungRecord, Touches, UnusableRecord, Variable};
 use crate::compare::model_ladder::{self, Curve, Kind, direction};
 use std::collections::{BTreeMap, HashMap};
@@ -15,7 +15,7 @@ fn short(x: f64) -> f64 {
     (x * 1e4).round() / 1e4 + 0.0
 }
 
-pub(super) fn touches(m: &Material) -> Touches {
+pub(super) fn touches(m: &ViewMaterial) -> Touches {
     let fit = m.fit;
     let points = &m.comparison.points;
     let mut words: Vec<String> = Vec::new();
@@ -61,7 +61,7 @@ pub(super) fn touches(m: &Material) -> Touches {
     }
 }
 
-pub(super) fn unusable(m: &Material) -> Vec<UnusableRecord> {
+pub(super) fn unusable(m: &ViewMaterial) -> Vec<UnusableRecord> {
     let each = m.fit.data.unusable.iter();
     each.map(|u| UnusableRecord {
         run: u.run + 1,
@@ -72,7 +72,7 @@ pub(super) fn unusable(m: &Material) -> Vec<UnusableRecord> {
     .collect()
 }
 
-pub(super) fn rungs(m: &Material) -> Vec<RungRecord> {
+pub(super) fn rungs(m: &ViewMaterial) -> Vec<RungRecord> {
     let each = m.ladder.rungs.iter().enumerate().map(|(i, r)| {
         let signed = |sign: &str, ids: &[String]| ids.iter().map(|e| format!("{sign}{e}")).collect::<Vec<_>>();
         let mut changes = signed("+", &r.added);
@@ -101,7 +101,7 @@ pub(super) fn rungs(m: &Material) -> Vec<RungRecord> {
 }
 
 /// What residuals are drawn against: the rotary axes, the linear ones, then time, order and approach; only what varies.
-pub(super) fn variables(m: &Material) -> Vec<Variable> {
+pub(super) fn variables(m: &ViewMaterial) -> Vec<Variable> {
     let points = &m.comparison.points;
     let share = |by: &[String]| m.comparison.splits.iter().find(|s| by.contains(&s.by)).map(|s| s.share);
     let mut out: Vec<Variable> = Vec::new();
@@ -132,7 +132,7 @@ pub(super) fn variables(m: &Material) -> Vec<Variable> {
 }
 
 /// Curves of each step of the ladder, and of the whole way from "before" to "after".
-pub(super) fn curves(m: &Material, before: usize, after: usize) -> Vec<Curve> {
+pub(super) fn curves(m: &ViewMaterial, before: usize, after: usize) -> Vec<Curve> {
     let ids: Vec<String> = variables(m).into_iter().map(|v| v.id).collect();
     let rungs = &m.ladder.rungs;
     let mut pairs: Vec<(usize, usize)> = (1..rungs.len()).map(|i| (i - 1, i)).collect();

@@ -529,6 +529,19 @@ pub fn kind(d: &Dependence, fit: &Fit) -> String {
     text.to_owned()
 }
 
+/// How far the evidence of an effect is beyond the noise, from the probability that noise alone gives as much (all effects
+/// that were tested counted in).
+#[must_use]
+pub fn beyond_noise(p_adjusted: f64) -> &'static str {
+    match p_adjusted {
+        p if p < 1e-6 => "far beyond the noise",
+        p if p < 1e-3 => "clearly beyond the noise",
+        p if p < 0.05 => "beyond the noise",
+        p if p < 0.5 => "may be noise",
+        _ => "no more than noise",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

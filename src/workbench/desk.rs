@@ -1,10 +1,15 @@
 //! The study of a session on its files: the study itself, and what is beside it under names that the study gives.
 
+use super::session::Snapshot;
+use super::shelf::Shelf;
 use super::{Answered, Opened, Place, Verb};
 use crate::diag::{Failure, Result};
+use crate::diagnose::Diagnosis;
 use crate::post::Postprocessor;
 use crate::study::Study;
+use crate::view::{Headline, Next};
 use crate::workflow::history::{history_path, read_history};
+use crate::workflow::view::verdict_of;
 use crate::workflow::{Disk, Environment, load_study};
 use std::hash::{Hash, Hasher};
 use std::path::PathBuf;
@@ -130,6 +135,19 @@ impl Desk {
         let (study, out) = (self.study.display().to_string(), self.folder.join(&folder).display().to_string());
         let words = [name.to_owned(), study, "--out".into(), out, "--controller".into(), controller.clone(), more];
         (self.call)(&words, folder)
+    }
+
+    /// The verdict in words and what to do next, as the report has them.
+    #[must_use]
+    pub fn verdict(&self, now: &Snapshot, shelf: &Shelf, found: &Diagnosis) -> (Headline, Vec<Next>) {
+        let proposed = found.candidates.first().filter(|c| c.proposed).and_then(|first| {
+            let mut settings = now.opened.quick_settings();
+            settings.effects.push(first.effect.clone());
+            // a candidate that cannot be fitted beside the others is still a candidate
+            shelf.fit(&now.opened, now.inputs, settings).ok()
+        });
+        let proposed = proposed.as_ref().map(|(fit, _)| &**fit);
+        verdict_of(&now.opened.loaded, &now.fit, proposed, found, &self.files)
     }
 
     /// Controllers that have programs, by name.

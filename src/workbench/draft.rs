@@ -18,7 +18,7 @@ const LONGEST: usize = 600;
 const MOST_ROWS: usize = 24;
 
 /// An effect as it was typed.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Draft {
     /// Short name, used in studies.
@@ -33,6 +33,9 @@ pub struct Draft {
     pub look: String,
     /// An axis of the chain, or base, tool, workpiece, block, trigger, reading.
     pub at: String,
+    /// What each has a size of its own: `block` or `run`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub per: Option<String>,
     /// The displacements.
     pub terms: Vec<DraftTerm>,
     /// Parameters that stand inside the formulas.
@@ -41,7 +44,7 @@ pub struct Draft {
 }
 
 /// A displacement as it was typed.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DraftTerm {
     /// Name of its factor.
@@ -52,10 +55,13 @@ pub struct DraftTerm {
     pub dof: String,
     /// The function of the state.
     pub formula: String,
+    /// Usual size of the factor, in its unit; none counts as the unit's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub typical: Option<f64>,
 }
 
 /// A parameter inside the formulas, as it was typed.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DraftShape {
     /// Its name in the formulas.
@@ -92,6 +98,25 @@ impl Mistake {
     }
 }
 
+impl Draft {
+    /// The draft that a row of an effects file is.
+    ///
+    /// # Errors
+    /// When the row has what the form does not.
+    pub fn from_row(toml: &str) -> crate::diag::Result<Self> {
+        #[derive(Deserialize)]
+        struct Rows {
+            effect: [Draft; 1],
+        }
+        let rows: Rows = toml::from_str(toml).map_err(|e| {
+            Failure::new("workbench::row", format!("the formula does not fit into the form: {}", e.message()))
+                .help("`axiscal sketch-effect` writes it into a file")
+        })?;
+        let [draft] = rows.effect;
+        Ok(draft)
+    }
+}
+
 /// The row of the effects file.
 #[must_use]
 pub fn row(draft: &Draft) -> String {
@@ -111,11 +136,17 @@ fn table(draft: &Draft) -> Table {
         }
     }
     table["at"] = value(&draft.at);
+    if let Some(per) = &draft.per {
+        table["per"] = value(per);
+    }
     let mut terms = Array::new();
     for t in &draft.terms {
         let mut term = InlineTable::new();
         for (word, text) in [("parameter", &t.parameter), ("unit", &t.unit), ("dof", &t.dof), ("formula", &t.formula)] {
             term.insert(word, text.trim().into());
+        }
+        if let Some(typical) = t.typical {
+            term.insert("typical", typical.into());
         }
         terms.push(term);
     }

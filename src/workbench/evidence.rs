@@ -1,6 +1,7 @@
 //! What the touches say of every effect, worked out behind the fit: first the score tests of the list, then the whole
 //! diagnosis.
 
+use super::draft::Draft;
 use super::session::Snapshot;
 use crate::diag::Result;
 use crate::diagnose::candidate_effects::Named;
@@ -23,6 +24,8 @@ pub struct Scored {
     pub p_adjusted: f64,
     /// Does it pass Holm's test? Whether it is proposed the diagnosis says, which also looks at touches left out.
     pub passes: bool,
+    /// The same in words: how far it is beyond the noise.
+    pub likely: &'static str,
     /// Share of the misfit's sum of squares that it takes away.
     pub share: f64,
     pub parameters: Vec<Size>,
@@ -61,6 +64,7 @@ pub fn scores(state: &Snapshot) -> Vec<Scored> {
             p: s.p,
             ln_p: s.ln_p,
             p_adjusted: s.p_adjusted,
+            likely: crate::words::diagnose::beyond_noise(s.p_adjusted),
             passes: s.proposed(),
             share: (s.delta_ss / total).clamp(0.0, 1.0),
             // sets of many blocks say nothing to a reader
@@ -78,4 +82,15 @@ pub fn scores(state: &Snapshot) -> Vec<Scored> {
 /// When a refit is impossible.
 pub fn diagnosis(state: &Snapshot) -> Result<Diagnosis> {
     state.opened.diagnose(&state.opened.quick_settings(), &state.fit, &Options::default())
+}
+
+/// A starting formula for what no known effect explains, and on what it rests.
+///
+/// # Errors
+/// When nothing significant is left, or what is left has no formula.
+pub fn sketched(state: &Snapshot) -> Result<(Draft, String)> {
+    let settings = state.opened.quick_settings();
+    let knows = |id: &str| state.opened.catalogue.knows(id);
+    let made = crate::diagnose::sketch::sketch(state.opened.subject(&settings, &state.fit), &knows)?;
+    Ok((Draft::from_row(&made.toml)?, made.says))
 }

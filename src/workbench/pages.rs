@@ -8,12 +8,18 @@ const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Name, kind, contents.
-const ASSETS: [(&str, &str, &str); 14] = [
+const ASSETS: [(&str, &str, &str); 20] = [
     ("plotly.min.js", SCRIPT, include_str!("../../web/vendor/plotly.min.js")),
+    ("tokens.css", STYLE, include_str!("../../web/tokens.css")),
     ("workbench.css", STYLE, include_str!("../../web/workbench.css")),
     ("main.js", SCRIPT, include_str!("../../web/workbench/main.js")),
     ("talk.js", SCRIPT, include_str!("../../web/workbench/talk.js")),
     ("events.js", SCRIPT, include_str!("../../web/workbench/events.js")),
+    ("tabs.js", SCRIPT, include_str!("../../web/workbench/tabs.js")),
+    ("where.js", SCRIPT, include_str!("../../web/workbench/where.js")),
+    ("ladder.js", SCRIPT, include_str!("../../web/workbench/ladder.js")),
+    ("next.js", SCRIPT, include_str!("../../web/workbench/next.js")),
+    ("results.js", SCRIPT, include_str!("../../web/workbench/results.js")),
     ("plots.js", SCRIPT, include_str!("../../web/workbench/plots.js")),
     ("correlation.js", SCRIPT, include_str!("../../web/workbench/correlation.js")),
     ("frame.js", SCRIPT, include_str!("../../web/workbench/frame.js")),

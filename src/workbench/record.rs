@@ -19,6 +19,7 @@ use crate::model::formula::FUNCTIONS;
 use crate::study::history::History;
 use crate::study::tolerance::Tolerance;
 use crate::units::um_from_mm;
+use crate::view::{Headline, Next};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -64,6 +65,10 @@ pub struct Behind {
     pub held_out_rms_um: Option<f64>,
     /// RMS on the last run left out.
     pub later_run_rms_um: Option<f64>,
+    /// The verdict in words, as the report has it.
+    pub headline: Option<Headline>,
+    /// What to do next, the first thing first.
+    pub next: Vec<Next>,
     pub ms: f64,
     /// Why there is none.
     pub failed: Vec<Message>,
@@ -119,6 +124,10 @@ struct Live<'a> {
     rejected: Vec<(usize, String)>,
     /// Indices of those that the study itself takes out.
     masked: Vec<usize>,
+    /// Share of the residual's variance that goes with each variable, in X, Y and Z (adjusted R²).
+    explained: Vec<VariableShare>,
+    /// The variable on which the residual depends most.
+    axis: Option<&'a str>,
     ladder: &'a History,
     job: Option<&'a Job>,
 }
@@ -133,6 +142,45 @@ fn bytes(record: &impl Serialize) -> Vec<u8> {
     serde_json::to_vec(record).unwrap_or_else(|_| b"{}".to_vec())
 }
 
+/// A row of the table "where the model fails".
+#[derive(Serialize)]
+struct VariableShare {
+    variable: &'static str,
+    share: [Option<f64>; 3],
+}
+
+/// What residuals may be drawn against: id and title of each; only what varies is offered.
+const OTHER_VARIABLES: [(&str, &str); 4] = [
+    ("time", "time since the first touch, h"),
+    ("order", "order of the touches, number"),
+    ("approach", "direction of approach about the probe's axis, deg"),
+    ("stylus", "pivot to ball, mm"),
+];
+
+const AXES: [&str; 6] = ["X", "Y", "Z", "A", "B", "C"];
+
+fn explained(now: &Snapshot) -> Vec<VariableShare> {
+    let points = crate::compare::points(&now.fit);
+    let all = AXES.into_iter().chain(OTHER_VARIABLES.iter().map(|v| v.0));
+    let each = all.map(|variable| {
+        let share = crate::compare::by_direction::explained(&points, variable).map(|s| s.map(|s| short(s, 1e4)));
+        VariableShare { variable, share }
+    });
+    each.filter(|v| v.share.iter().any(Option::is_some)).collect()
+}
+
+/// The variable with the largest share in a direction; of equals the first.
+fn most_explaining(all: &[VariableShare]) -> Option<&'static str> {
+    let largest = |v: &VariableShare| v.share.iter().flatten().copied().fold(0.0, f64::max);
+    let mut best: Option<(&'static str, f64)> = None;
+    for v in all {
+        if best.is_none_or(|(_, share)| largest(v) > share) {
+            best = Some((v.variable, largest(v)));
+        }
+    }
+    best.map(|(variable, _)| variable)
+}
+
 /// What a step changes.
 #[must_use]
 pub fn live(now: &Snapshot, job: Option<&Job>) -> Vec<u8> {
@@ -140,6 +188,7 @@ pub fn live(now: &Snapshot, job: Option<&Job>) -> Vec<u8> {
     let masks = &now.opened.study.masked;
     let masked: std::collections::HashSet<(usize, u64)> = masks.iter().map(|m| (m.run, m.id)).collect();
     let observations = &fit.data.observations;
+    let explained = explained(now);
     bytes(&Live {
         format: FORMAT,
         version: now.version,
@@ -174,6 +223,8 @@ pub fn live(now: &Snapshot, job: Option<&Job>) -> Vec<u8> {
         masked: (0..observations.len())
             .filter(|&i| masked.contains(&(observations[i].run, observations[i].id)))
             .collect(),
+        axis: most_explaining(&explained),
+        explained,
         ladder: &now.opened.history,
         job,
     })
@@ -253,6 +304,19 @@ struct MachineRecord<'a> {
     solids: Vec<Solid<'a>>,
     blocks: Vec<Block<'a>>,
     axes: Vec<AxisRecord>,
+    /// Each index position: where the parts of the machine stand there.
+    poses: Vec<Pose>,
+}
+
+/// An index position.
+#[derive(Serialize)]
+struct Pose {
+    /// Number of the visit, from 1.
+    visit: usize,
+    /// Rotary axes, deg.
+    says: String,
+    /// By carrier: rows of rotation and translation, mm, of its frame in R.
+    frames: BTreeMap<String, [f64; 12]>,
 }
 
 #[derive(Serialize)]
@@ -266,6 +330,7 @@ struct AxisRecord {
 #[derive(Serialize)]
 struct Solid<'a> {
     name: &'a str,
+    carrier: String,
     at: [f64; 3],
     size: Option<[f64; 3]>,
     direction: Option<[f64; 3]>,
@@ -275,6 +340,7 @@ struct Solid<'a> {
 #[derive(Serialize)]
 struct Block<'a> {
     name: &'a str,
+    carrier: String,
     centre: [f64; 3],
 }
 
@@ -285,15 +351,19 @@ struct Touches {
     run: Vec<usize>,
     id: Vec<u64>,
     line: Vec<usize>,
-    /// Words that `stage`, `block` and `face` count, from 0.
+    /// Words that `stage`, `block`, `face` and `carrier` count, from 0.
     words: Vec<String>,
     stage: Vec<usize>,
     block: Vec<usize>,
     face: Vec<usize>,
     visit: Vec<usize>,
+    /// What carries the artefact.
+    carrier: Vec<usize>,
     axes: BTreeMap<String, Vec<f64>>,
     time_h: Vec<f64>,
     approach_deg: Vec<Option<f64>>,
+    /// Pivot to ball, mm.
+    stylus_mm: Vec<f64>,
     /// Nominal contact point and outward normal, in the carrier's frame.
     point: Vec<[f64; 3]>,
     normal: Vec<[f64; 3]>,
@@ -388,11 +458,17 @@ fn machine_record(now: &Snapshot) -> MachineRecord<'_> {
     let machine = &*now.opened.machine;
     let three = |v: &nalgebra::Vector3<f64>| [v.x, v.y, v.z];
     let solids = machine.solids.iter().map(|s| match s.shape {
-        Shape::Box { centre, size } => {
-            Solid { name: &s.name, at: three(&centre), size: Some(three(&size)), direction: None, radius_height: None }
-        }
+        Shape::Box { centre, size } => Solid {
+            name: &s.name,
+            carrier: s.carrier.to_string(),
+            at: three(&centre),
+            size: Some(three(&size)),
+            direction: None,
+            radius_height: None,
+        },
         Shape::Cylinder { foot, direction, radius, height } => Solid {
             name: &s.name,
+            carrier: s.carrier.to_string(),
             at: three(&foot),
             size: None,
             direction: Some(three(&direction)),
@@ -404,7 +480,11 @@ fn machine_record(now: &Snapshot) -> MachineRecord<'_> {
         name: &machine.name,
         says: &machine.says,
         solids: solids.collect(),
-        blocks: set_ups.iter().map(|s| Block { name: &s.label, centre: three(&s.centre) }).collect(),
+        blocks: set_ups
+            .iter()
+            .map(|s| Block { name: &s.label, carrier: s.carrier.to_string(), centre: three(&s.centre) })
+            .collect(),
+        poses: poses(now),
         axes: machine
             .axes
             .iter()
@@ -416,6 +496,39 @@ fn machine_record(now: &Snapshot) -> MachineRecord<'_> {
             })
             .collect(),
     }
+}
+
+/// Index positions in their order; the linear axes at the mean of the touches there.
+fn poses(now: &Snapshot) -> Vec<Pose> {
+    let (machine, data) = (&*now.opened.machine, &now.fit.data);
+    let carriers: std::collections::BTreeMap<String, crate::machine::Carrier> = machine
+        .solids
+        .iter()
+        .map(|s| s.carrier)
+        .chain(data.set_ups.iter().map(|s| s.carrier))
+        .map(|c| (c.to_string(), c))
+        .collect();
+    let mut members: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+    for (i, visit) in data.visits.iter().enumerate() {
+        members.entry(visit + 1).or_default().push(i);
+    }
+    let pose = |(visit, members): (usize, Vec<usize>)| {
+        let mut at = data.observations[members[0]].position.clone();
+        for axis in machine.axes.iter().filter(|a| !a.name.is_rotary()) {
+            let sum: f64 = members.iter().map(|&i| data.observations[i].position.get(axis.name)).sum();
+            at.set(axis.name, sum / members.len() as f64);
+        }
+        let rotary = machine.axes.iter().filter(|a| a.name.is_rotary());
+        let says: Vec<String> = rotary.map(|a| format!("{} {}°", a.name, short(at.get(a.name), 1e3))).collect();
+        let frames = carriers.iter().map(|(name, carrier)| {
+            let frame = machine.carrier_frame(*carrier, &at).to_homogeneous();
+            let row = |r: usize| [0, 1, 2, 3].map(|c| short(frame[(r, c)], 1e6));
+            let [a, b, c] = [row(0), row(1), row(2)];
+            (name.clone(), [a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3], c[0], c[1], c[2], c[3]])
+        });
+        Pose { visit, says: says.join(", "), frames: frames.collect() }
+    };
+    members.into_iter().map(pose).collect()
 }
 
 fn touches(now: &Snapshot) -> Touches {
@@ -439,11 +552,13 @@ fn touches(now: &Snapshot) -> Touches {
         out.block.push(word(p.block));
         out.face.push(word(p.face));
         out.visit.push(p.visit);
+        out.carrier.push(word(now.fit.data.set_ups[o.set_up].carrier.to_string()));
         for (name, value) in p.axes {
             out.axes.entry(name).or_default().push(position(value));
         }
         out.time_h.push(short(p.time_h, 1e6));
         out.approach_deg.push(p.approach_deg.map(|a| short(a, 1e3)));
+        out.stylus_mm.push(short(p.stylus_mm, 1e4));
         out.point.push(three(&o.point));
         out.normal.push(three(&o.normal));
         out.normal_r.push(p.normal.map(position));
@@ -467,15 +582,17 @@ fn variables(machine: &Machine, touches: &Touches) -> Vec<Variable> {
             out.push(Variable { title: format!("{kind} axis {id}, {unit}"), id });
         }
     }
-    let mut more = |id: &str, title: &str, there: bool| {
+    for (id, title) in OTHER_VARIABLES {
+        let there = match id {
+            "time" => varies(touches.time_h.iter().copied()),
+            "order" => touches.n > 1,
+            "approach" => varies(touches.approach_deg.iter().flatten().copied()),
+            _ => varies(touches.stylus_mm.iter().copied()),
+        };
         if there {
             out.push(Variable { id: id.into(), title: title.into() });
         }
-    };
-    more("time", "time since the first touch, h", varies(touches.time_h.iter().copied()));
-    more("order", "order of the touches, number", touches.n > 1);
-    let approach = varies(touches.approach_deg.iter().flatten().copied());
-    more("approach", "direction of approach about the probe's axis, deg", approach);
+    }
     out
 }
 

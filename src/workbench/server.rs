@@ -169,6 +169,7 @@ pub fn router(shared: Arc<Shared>) -> Router {
         .route("/api/events", get(events))
         .route("/api/step", post(step))
         .route("/api/try", post(try_out))
+        .route("/api/sketch", post(sketch))
         .route("/api/call", post(call))
         .layer(from_fn_with_state(shared.clone(), with_token));
     Router::new()
@@ -330,6 +331,7 @@ enum AskAsWritten {
     Mask { touches: Vec<(usize, u64)>, reason: String },
     Unmask { touches: Vec<(usize, u64)> },
     Save { draft: Box<Draft>, on: bool },
+    Model { effects: Vec<String> },
     Undo,
     Redo,
 }
@@ -345,6 +347,7 @@ impl AskAsWritten {
             Self::Mask { touches, reason } => Ask::Mask { touches: from_zero(touches)?, reason },
             Self::Unmask { touches } => Ask::Unmask { touches: from_zero(touches)? },
             Self::Save { draft, on } => Ask::Save { draft, on },
+            Self::Model { effects } => Ask::Model { effects },
             Self::Undo => Ask::Undo,
             Self::Redo => Ask::Redo,
         })
@@ -407,7 +410,42 @@ async fn try_out(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
         }
         match record::tried(&now, &shared.shelf, asked.effect.as_deref(), asked.draft.as_ref()) {
             Ok(bytes) => answer_json(bytes),
-            Err(why) => refused(why),
+            Err(why @ Refused::Stale(_)) => refused(why),
+            // a formula that is not finished yet is an answer and no fault
+            Err(why) => {
+                let mut answer = refused(why);
+                *answer.status_mut() = StatusCode::OK;
+                answer
+            }
+        }
+    })
+    .await
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SketchAsked {
+    version: u64,
+}
+
+/// A starting formula for what no known effect explains, as the formula box takes it. Writes nothing.
+async fn sketch(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
+    aside(shared, move |shared| {
+        let asked: SketchAsked = match read(&body) {
+            Ok(asked) => asked,
+            Err(response) => return *response,
+        };
+        let now = snapshot(shared);
+        if now.version != asked.version {
+            return refused(Refused::Stale(now.version));
+        }
+        match evidence::sketched(&now) {
+            Ok((draft, says)) => answer_json(json!({ "draft": draft, "says": says }).to_string().into_bytes()),
+            Err(failure) => {
+                let mut answer = refused(Refused::Unusable(failure));
+                *answer.status_mut() = StatusCode::OK;
+                answer
+            }
         }
     })
     .await
@@ -524,7 +562,12 @@ fn work_behind(shared: &Arc<Shared>, woken: &mpsc::Receiver<()>) {
                 return;
             }
             match evidence::diagnosis(&now) {
-                Ok(found) => behind.diagnosis = Some(found),
+                Ok(found) => {
+                    let (headline, next) = shared.desk.verdict(&now, &shared.shelf, &found);
+                    behind.headline = Some(headline);
+                    behind.next = next;
+                    behind.diagnosis = Some(found);
+                }
                 Err(failure) => behind.failed = record::messages(&failure.0),
             }
             behind.complete = true;

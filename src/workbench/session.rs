@@ -72,6 +72,10 @@ pub enum Ask {
         /// Into the model, too?
         on: bool,
     },
+    /// Back to a model of the ladder: these effects and no others.
+    Model {
+        effects: Vec<String>,
+    },
     Undo,
     /// The step that was taken back made again.
     Redo,
@@ -164,7 +168,7 @@ impl Session {
             Ask::Undo => self.turn_back()?,
             Ask::Redo => self.turn_forward()?,
             Ask::Save { draft, on } => self.save(&draft, on)?,
-            Ask::Switch { .. } | Ask::Mask { .. } | Ask::Unmask { .. } => {
+            Ask::Switch { .. } | Ask::Mask { .. } | Ask::Unmask { .. } | Ask::Model { .. } => {
                 let (text, says) = self.edited(&ask)?;
                 let after = Files { study: self.state.opened.with_text(&text)?.bytes, effects: None };
                 self.make(says, after)?;
@@ -265,6 +269,16 @@ impl Session {
             }
             Ask::Switch { effect, on: false } => {
                 Ok((Edit::Remove(std::slice::from_ref(effect)).text(opened)?, format!("{effect} off")))
+            }
+            Ask::Model { effects } => {
+                let now = &opened.study.effects;
+                let new: Vec<String> = effects.iter().filter(|e| !now.contains(e)).cloned().collect();
+                let gone: Vec<String> = now.iter().filter(|e| !effects.contains(e)).cloned().collect();
+                // first what is new: a model may not be without effects
+                let with = if new.is_empty() { text } else { Edit::Add(&new).text(opened)? };
+                let signed = |sign: &str, ids: &[String]| ids.iter().map(|e| format!("{sign}{e}")).collect::<Vec<_>>();
+                let says = [signed("+", &new), signed("\u{2212}", &gone)].concat().join(" ");
+                Ok((edit::remove(&with, &gone)?, format!("back to an earlier model: {says}")))
             }
             Ask::Mask { touches, reason } => {
                 every_touch_exists(opened, touches)?;

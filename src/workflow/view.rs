@@ -11,7 +11,7 @@ use crate::diagnose::{Diagnosis, Options, with_effects};
 use crate::fit::Fit;
 use crate::study::history::History;
 use crate::tables::Correction;
-use crate::view::{Material, RunFiles, View, gather};
+use crate::view::{Headline, Material, Next, RunFiles, View, ViewMaterial, gather, verdict_and_steps};
 
 /// Everything that was worked out for a view; what it borrows is in [`Loaded`].
 pub struct Worked {
@@ -55,30 +55,66 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>, env: &dyn Environmen
             Err(failure) => ladder.notes.push(format!("{} cannot be added to the model: {failure}", first.effect)),
         }
     }
-    let date = newest_log(loaded, env);
-    let correction = loaded
-        .active(env)
-        .and_then(|active| correction(loaded, &fit, &date, Vec::new(), active.as_ref()))
-        .map(|(correction, _)| correction)
-        .map_err(|failure| failure.to_string());
+    let (correction, date) = possible_correction(loaded, &fit, env);
     let comparison = compare(&fit).led_by(&leads(&diagnosis));
     Ok(Worked { comparison, proposed, diagnosis, ladder, correction, date, fit })
 }
 
+fn run_files(loaded: &Loaded) -> Vec<RunFiles<'_>> {
+    let each = loaded.runs.iter().zip(&loaded.study.data);
+    each.map(|(run, entry)| RunFiles {
+        plan: &entry.plan,
+        log: &entry.log,
+        controller: &entry.controller,
+        touches: &run.plan,
+    })
+    .collect()
+}
+
+/// What a compensation of these values would carry, or why none can be made; and the day of the data.
+fn possible_correction(
+    loaded: &Loaded,
+    fit: &Fit,
+    env: &dyn Environment,
+) -> (std::result::Result<Correction, String>, String) {
+    let date = newest_log(loaded, env);
+    let correction = loaded
+        .active(env)
+        .and_then(|active| correction(loaded, fit, &date, Vec::new(), active.as_ref()))
+        .map(|(correction, _)| correction)
+        .map_err(|failure| failure.to_string());
+    (correction, date)
+}
+
+/// The verdict and the steps alone, from what the workbench has at hand.
+#[must_use]
+pub fn verdict_of(
+    loaded: &Loaded,
+    fit: &Fit,
+    proposed: Option<&Fit>,
+    diagnosis: &Diagnosis,
+    env: &dyn Environment,
+) -> (Headline, Vec<Next>) {
+    let (correction, date) = possible_correction(loaded, fit, env);
+    verdict_and_steps(&Material {
+        study: &loaded.name(),
+        sha256: &loaded.sha256,
+        date: &date,
+        machine: &loaded.machine,
+        catalogue: &loaded.catalogue,
+        runs: &run_files(loaded),
+        tolerance: &loaded.study.tolerance,
+        fit,
+        proposed,
+        diagnosis,
+        correction: correction.as_ref().map_err(String::as_str),
+    })
+}
+
 #[must_use]
 pub fn view_of(loaded: &Loaded, worked: &Worked) -> View {
-    let runs: Vec<RunFiles> = loaded
-        .runs
-        .iter()
-        .zip(&loaded.study.data)
-        .map(|(run, entry)| RunFiles {
-            plan: &entry.plan,
-            log: &entry.log,
-            controller: &entry.controller,
-            touches: &run.plan,
-        })
-        .collect();
-    gather(&Material {
+    let runs = run_files(loaded);
+    let verdict = Material {
         study: &loaded.name(),
         sha256: &loaded.sha256,
         date: &worked.date,
@@ -88,9 +124,8 @@ pub fn view_of(loaded: &Loaded, worked: &Worked) -> View {
         tolerance: &loaded.study.tolerance,
         fit: &worked.fit,
         proposed: worked.proposed.as_ref(),
-        comparison: &worked.comparison,
         diagnosis: &worked.diagnosis,
-        ladder: &worked.ladder,
         correction: worked.correction.as_ref().map_err(String::as_str),
-    })
+    };
+    gather(&ViewMaterial { verdict, comparison: &worked.comparison, ladder: &worked.ladder })
 }

@@ -8,6 +8,7 @@ import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { reportCases } from "./report.mjs";
+import { oneScreenCases } from "./one_screen.mjs";
 import { workbenchCases } from "./workbench.mjs";
 
 const out = process.env.AXISCAL_BROWSER_OUT;
@@ -16,7 +17,7 @@ const pictures = process.env.AXISCAL_PICTURES ? join(process.env.AXISCAL_ROOT, "
 if (pictures) mkdirSync(pictures, { recursive: true });
 
 const wanted = process.argv.slice(2);
-const cases = [...reportCases, ...workbenchCases].filter(([name]) => !wanted.length || wanted.some((w) => name.includes(w)));
+const cases = [...reportCases, ...oneScreenCases, ...workbenchCases].filter(([name]) => !wanted.length || wanted.some((w) => name.includes(w)));
 const dir = mkdtempSync(join(tmpdir(), "axiscal-browser-"));
 
 const browser = await chromium.launch({
@@ -29,7 +30,7 @@ const browser = await chromium.launch({
 let failed = 0;
 for (const [name, run] of cases) {
   const began = performance.now();
-  const context = await browser.newContext({ viewport: { width: 1280, height: 900 }, reducedMotion: "reduce" });
+  const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, reducedMotion: "reduce" });
   const ends = [];
   try {
     await run({ context, dir, out, pictures, atEnd: (end) => ends.push(end) });

@@ -148,7 +148,7 @@ export async function watched(context) {
   return [page, seen];
 }
 
-// an answer that says no (a stale state, a mistake in a formula) is shown in the page, and Chromium notes it as well
+// an answer that says no (a stale state, a call that is refused) is shown in the page, and Chromium notes it as well
 const refusal = (text) => /Failed to load resource: the server responded with a status of (409|422)/.test(text);
 
 /** A screenshot for the eye, and for the guide where that is asked for. */

@@ -1,89 +1,96 @@
-// The list of effects: what is in the model, and what the touches say of every other one, with a switch for each.
+// The candidates, best first: those that these touches cannot separate stand together. Each has its small curve. Below: what is in the model.
 
 import { later, never } from "./later.js";
-import { state, on, setPreview, step, trouble, tryOut } from "./talk.js";
-import { byId, chance, element, show, significant, sized, stated } from "./words.js";
+import { glance, state, on, setPreview, step, trouble, tryOut } from "./talk.js";
+import { DIRECTIONS, curvePoints, follow, membersOf, onAxis, values, variable } from "./plots.js";
+import { byId, chance, colour, element, show, significant, sized, stated, unitOf } from "./words.js";
 
-const FEW = 12;
+/** Cards that are shown at once. */
+const FEW = 6;
+/** Candidates that get a small curve: each is a fit, and large studies take their time. */
+const curvesFor = () => (state.inputs.touches.n > 2500 ? 1 : FEW);
+
 let all = false;
 let opened = null;
+/** Did the person choose a candidate of this model, or close one? Otherwise the first one is shown. */
+let chosenFor = 0;
+/** What each candidate would take away, of the present model. */
+let tried = new Map();
 
 function toggle(effect, isOn, disabled) {
   return element("button", {
-    type: "button", role: "switch", "aria-checked": String(isOn), "aria-label": `${effect.name} (${effect.id})`,
-    "data-switch": effect.id, disabled, click: async (e) => {
+    type: "button", role: "switch", "aria-checked": String(isOn), "aria-label": `${effect.name} (${effect.id})`, "data-switch": effect.id, disabled,
+    click: async (e) => {
       const id = e.currentTarget.dataset.switch;
       await step({ switch: { effect: id, on: !isOn } });
       // the row has moved to the other list: the keyboard goes along
       draw();
       document.querySelector(`[data-switch="${CSS.escape(id)}"]`)?.focus();
     },
-  }, element("span", { "aria-hidden": "true" }));
+  }, isOn ? "Remove" : "Add");
 }
 
-/** How an effect stands to the test with all of them counted in, and beside the first candidate. */
-function standing(id, score) {
-  if (!score.passes) return "no more than noise";
+/** What the diagnosis says of an effect. */
+const candidate = (id) => state.behind?.diagnosis?.candidates.find((c) => c.effect === id);
+
+function opener(effect) {
+  return element("button", { type: "button", class: "open", "aria-expanded": String(opened === effect.id), click: () => (opened === effect.id ? close() : look(effect.id)) }, effect.name);
+}
+
+/** How an effect stands: in words, with its expected size. */
+function standing(effect, score) {
+  if (!score) return "not tested yet";
+  if (!score.visible) return "has no effect on these touches";
   const found = state.behind?.diagnosis;
-  if (candidate(id)?.proposed) return "passes the test: proposed";
   const first = found?.candidates[0];
-  if (!found || first?.effect === id || first?.same_as.includes(id)) return "passes the test";
-  return first?.proposed ? "passes the test: explains part, less than the first" : "passes the test";
+  const isFirst = first?.effect === effect.id || first?.same_as.includes(effect.id);
+  const extra = candidate(effect.id)?.proposed ? ", proposed" : score.passes && first?.proposed && !isFirst ? ", explains less than the first" : "";
+  const size = score.parameters[0];
+  return `${score.likely}${extra}${size ? `; ${size.name} about ${stated(size.value, size.sigma)} ± ${significant(size.sigma, 2)} ${unitOf(size.unit)}` : ""}`;
 }
 
-/** What the diagnosis adds to the score of an effect. */
-function candidate(id) {
-  return state.behind?.diagnosis?.candidates.find((c) => c.effect === id);
-}
-
-function row(effect, score) {
-  const { live } = state;
-  const isOn = live.effects.includes(effect.id);
-  const item = element("li", { "data-effect": effect.id, class: score?.passes ? "proposed" : null });
+function card(effect, score, same, byName) {
   const isOpen = opened === effect.id;
-  const open = element("button", {
-    type: "button", class: "open", "aria-expanded": String(isOpen), click: () => (opened === effect.id ? close() : look(effect.id)),
-  }, effect.name);
-  const what = element("div", { class: "what" }, open, element("small", {}, effect.id));
-  item.append(element("div", { class: "head" }, toggle(effect, isOn, isOn && live.effects.length === 1), what));
-  if (isOn) {
-    const own = live.parameters.filter((p) => p.effect === effect.id).slice(0, 6);
-    if (own.length) what.append(element("small", {}, own.map((p) => (p.sigma || p.status === "fixed" ? `${p.name} ${stated(p.value, p.sigma)} ${p.unit}` : `${p.name} not determined`)).join(", ")));
-  } else if (score) {
-    const strength = score.visible ? Math.min(1, Math.max(0, -score.ln_p / Math.LN10 / 20)) : 0;
-    const bar = element("i");
-    bar.style.width = `${100 * strength}%`;
-    const first = score.parameters[0];
-    const words = score.visible
-      ? `${standing(effect.id, score)}; probability ${chance(score.p_adjusted, score.ln_p)}${first ? `; ${first.name} about ${stated(first.value, first.sigma)} ± ${significant(first.sigma, 2)} ${first.unit}` : ""}`
-      : "has no effect on these touches";
-    const found = candidate(effect.id);
-    const same = [...(found?.same_as ?? []), ...(found?.or_else ? [found.or_else] : [])];
-    what.append(element("div", { class: "bar", "aria-hidden": "true" }, bar), element("small", {}, words));
-    if (same.length) what.append(element("small", {}, `cannot be separated from ${same.join(", ")}`));
+  const canvas = element("canvas", { "aria-hidden": "true", "data-curve": effect.id, hidden: !tried.has(effect.id) });
+  const item = element("li", { "data-effect": effect.id, class: [candidate(effect.id)?.proposed ? "proposed" : "", isOpen ? "chosen" : ""].join(" ").trim() || null },
+    element("div", { class: "head" }, opener(effect), toggle(effect, false, false)),
+    element("div", { class: "evidence" }, canvas, element("small", { title: score ? `probability of so much from noise alone, all effects counted in: ${chance(score.p_adjusted, score.ln_p)}` : null }, standing(effect, score))));
+  if (isOpen) item.append(details(effect));
+  if (same.length) {
+    const others = same.map((id) => byName.get(id)).filter(Boolean);
+    item.append(element("small", {}, "These touches cannot separate it from:"),
+      element("ul", { class: "same" }, others.map((e) => element("li", { "data-effect": e.id }, opener(e), toggle(e, false, false)))));
+    const other = others.find((e) => e.id === opened);
+    if (other) item.append(details(other));
   }
-  if (isOpen) item.append(details(effect, isOn));
   return item;
 }
 
-function details(effect, isOn) {
+function details(effect) {
   const found = candidate(effect.id);
   const box = element("div", { class: "details" });
-  const line = (word, text) => text && box.append(element("p", {}, element("strong", {}, `${word}: `), text));
-  line("What it is", effect.says);
-  line("Check at the machine", effect.look);
-  line("How to correct it", effect.mends);
-  line("What separates them", found?.tell_apart);
   const preview = state.preview;
-  if (!isOn && preview?.effect === effect.id) {
+  if (preview?.effect === effect.id) {
     const sizes = preview.parameters.map((p) => sized(p)).join(", ");
-    line("With it", `${significant(preview.rms_before_um)} → ${significant(preview.rms_after_um)} µm RMS${sizes ? `; ${sizes}` : ""}`);
+    box.append(element("p", {}, element("strong", {}, "With it: "), `${significant(preview.rms_before_um)} → ${significant(preview.rms_after_um)} µm RMS${sizes ? `; ${sizes}` : ""}`));
   }
+  const lines = [["What it is", effect.says], ["Check", effect.look], ["How to correct it", effect.mends], ["What separates them", found?.tell_apart]].filter(([, text]) => text);
+  box.append(element("details", {}, element("summary", {}, "Check at the machine"), lines.map(([word, text]) => element("p", {}, element("strong", {}, `${word}: `), text))));
   return box;
+}
+
+function inModel(effect) {
+  const { live } = state;
+  const own = live.parameters.filter((p) => p.effect === effect.id).slice(0, 3);
+  const words = own.map((p) => (p.sigma || p.status === "fixed" ? `${p.name} ${stated(p.value, p.sigma)} ${unitOf(p.unit)}` : `${p.name} not determined`)).join(", ");
+  const item = element("li", { "data-effect": effect.id }, element("div", { class: "head" }, opener(effect), toggle(effect, true, live.effects.length === 1)), words ? element("small", {}, words) : null);
+  if (opened === effect.id) item.append(details(effect));
+  return item;
 }
 
 async function look(id) {
   opened = id;
+  chosenFor = state.live.version;
   draw();
   refocus(id);
   if (state.live.effects.includes(id)) return;
@@ -97,6 +104,7 @@ async function look(id) {
 function close() {
   const id = opened;
   opened = null;
+  chosenFor = state.live.version;
   setPreview(null);
   draw();
   refocus(id);
@@ -115,19 +123,18 @@ function keepFocus(work) {
   if (id) document.querySelector(`[data-effect="${CSS.escape(id)}"] ${which}`)?.focus({ preventScroll: true });
 }
 
-function matches(e) {
-  const wanted = byId("find").value.trim().toLowerCase();
-  return !wanted || `${e.id} ${e.name} ${e.says} ${e.family}`.toLowerCase().includes(wanted);
-}
+const searched = () => byId("find").value.trim().toLowerCase();
+const matches = (e) => `${e.id} ${e.name} ${e.says} ${e.family}`.toLowerCase().includes(searched());
 
-/** The list of what is in the model; the other one is long. */
 function drawModel() {
   const { live, inputs, behind } = state;
   const byName = new Map(inputs.effects.map((e) => [e.id, e]));
-  const effects = live.effects.map((id) => byName.get(id)).filter((e) => e && matches(e));
-  byId("in-model").replaceChildren(...effects.map((e) => row(e, null)));
+  const model = live.effects.map((id) => byName.get(id) ?? { id, name: id, says: "" });
+  byId("in-model").replaceChildren(...model.filter((e) => !searched() || matches(e)).map(inModel));
+  show("model-count", String(model.length));
   const working = behind?.version !== live.version || !behind.complete;
-  show("evidence-state", working ? "working out what the touches say of each effect …" : "");
+  const some = behind?.scores?.some((s) => s.passes);
+  show("evidence-state", working ? "testing every effect on these touches …" : some ? "" : "No effect that is not in the model is beyond the noise.");
   byId("candidates").dataset.complete = String(!working);
 }
 
@@ -136,22 +143,28 @@ function draw() {
   if (!state.live) return;
   keepFocus(() => {
     const { live, inputs, behind } = state;
-    const wanted = byId("find").value.trim();
     const byName = new Map(inputs.effects.map((e) => [e.id, e]));
-    const current = behind?.version === live.version;
-    const scores = current && behind.scores ? behind.scores : [];
+    const scores = behind?.version === live.version && behind.scores ? behind.scores : [];
     const ranked = rank(scores);
-    const known = new Set(ranked.map((s) => s.effect));
-    let rest = ranked.map((s) => [byName.get(s.effect), s]).filter(([e]) => e);
-    for (const e of inputs.effects) {
-      if (!known.has(e.id) && !live.effects.includes(e.id) && (!e.paper || wanted)) rest.push([e, null]);
+    const scoreOf = new Map(ranked.map((s) => [s.effect, s]));
+    const grouped = new Set();
+    const cards = [];
+    const listed = [...ranked.map((s) => s.effect), ...inputs.effects.filter((e) => !scoreOf.has(e.id) && (!e.paper || searched())).map((e) => e.id)];
+    for (const id of listed) {
+      const effect = byName.get(id);
+      if (!effect || live.effects.includes(id) || grouped.has(id)) continue;
+      const found = candidate(id);
+      const same = (found?.same_as ?? []).filter((s) => byName.has(s) && !live.effects.includes(s));
+      if (searched() && !matches(effect) && !same.some((s) => matches(byName.get(s)))) continue;
+      same.forEach((s) => grouped.add(s));
+      cards.push([effect, scoreOf.get(id), same]);
     }
-    rest = rest.filter(([e]) => matches(e) && !live.effects.includes(e.id));
-    const shown = all || wanted ? rest : rest.slice(0, FEW);
-    byId("candidates").replaceChildren(...shown.map(([e, s]) => row(e, s)));
-    byId("more").hidden = Boolean(wanted) || rest.length <= FEW;
-    show("more", all ? "Show the strongest only" : `Show all ${rest.length} effects`);
+    const shown = all || searched() ? cards : cards.slice(0, FEW);
+    byId("candidates").replaceChildren(...shown.map(([e, s, same]) => card(e, s, same, byName)));
+    byId("more").hidden = Boolean(searched()) || cards.length <= FEW;
+    show("more", all ? "Show the strongest only" : `Show all ${cards.length} effects`);
     drawModel();
+    drawCurves();
   });
 }
 
@@ -162,23 +175,84 @@ function rank(scores) {
   return [...scores].sort((a, b) => place(a) - place(b));
 }
 
+/** What each of the first candidates takes away, against the variable of the large plot. */
+function drawCurves() {
+  const x = values(variable().id);
+  for (const canvas of byId("candidates").querySelectorAll("canvas")) {
+    const um = tried.get(canvas.dataset.curve);
+    canvas.hidden = !um;
+    if (!um) continue;
+    const [wide, high, dots] = [72, 30, globalThis.devicePixelRatio || 1];
+    canvas.width = wide * dots;
+    canvas.height = high * dots;
+    const pen = canvas.getContext("2d");
+    pen.scale(dots, dots);
+    const lines = DIRECTIONS.map((_, d) => curvePoints(membersOf(d), x, um, 24));
+    const [xs, ys] = [lines.flatMap((l) => l.x), lines.flatMap((l) => l.y.map(Math.abs))];
+    const [low, far, top] = [Math.min(...xs), Math.max(...xs), Math.max(...ys, 1e-9)];
+    pen.fillStyle = colour("grid");
+    pen.fillRect(0, high / 2, wide, 1);
+    lines.forEach((line, d) => {
+      pen.strokeStyle = colour(DIRECTIONS[d].toLowerCase());
+      pen.lineWidth = 1.5;
+      pen.beginPath();
+      line.x.forEach((v, k) => {
+        const [px, py] = [2 + ((v - low) / (far - low || 1)) * (wide - 4), high / 2 - (line.y[k] / top) * (high / 2 - 2)];
+        if (k) pen.lineTo(px, py); else pen.moveTo(px, py);
+      });
+      pen.stroke();
+    });
+  }
+}
+
+/** Fits the first candidates one by one for their curves; ends when the model changes. */
+async function collect() {
+  const { version } = state.live;
+  const first = state.behind.diagnosis?.candidates.slice(0, curvesFor()).map((c) => c.effect) ?? [];
+  for (const id of first) {
+    if (state.live.version !== version) return;
+    if (tried.has(id) || state.live.effects.includes(id)) continue;
+    try {
+      const found = await glance(id);
+      if (!found) return;
+      tried.set(id, found.curve_um);
+      drawCurves();
+    } catch {
+      // what cannot be fitted has no curve; its card says so when it is opened
+    }
+  }
+}
+
 byId("find").addEventListener("input", draw);
 byId("more").addEventListener("click", () => { all = !all; draw(); });
 on("live", (live, newer, first) => {
-  if (newer && opened && live.effects.includes(opened)) opened = null;
-  if (!newer || first) {
-    draw();
-    return;
+  if (newer) {
+    tried = new Map();
+    opened = null;
   }
+  if (!newer || first) return draw();
   keepFocus(drawModel);
   later("effects", draw);
 });
-on("behind", draw);
+on("behind", (behind) => {
+  draw();
+  if (!behind.complete) return;
+  const best = behind.diagnosis?.candidates[0];
+  // the curve of the best candidate is there without a click
+  if (best?.proposed && chosenFor !== state.live.version && !state.preview && byId("formula").hidden) {
+    opened = best.effect;
+    follow();
+    draw();
+    tryOut({ effect: best.effect }).catch(trouble);
+  }
+  collect();
+});
 on("preview", (preview) => {
   const box = byId("previewed");
   box.hidden = !preview;
-  box.textContent = preview
-    ? `Curve: what ${preview.effect} would explain, ${significant(preview.rms_before_um)} → ${significant(preview.rms_after_um)} µm RMS (Escape hides it)`
-    : "";
+  const name = state.inputs?.effects.find((e) => e.id === preview?.effect)?.name ?? preview?.effect;
+  box.textContent = preview ? `Curve: ${name}, ${significant(preview.rms_before_um)} → ${significant(preview.rms_after_um)} µm RMS` : "";
+  if (preview) tried.set(preview.effect, preview.curve_um);
   later("effects", draw);
 });
+onAxis(drawCurves);

@@ -1,6 +1,8 @@
 // The formula box: an effect as a person types it, its curve over the residual, and the way into the effects file.
 
-import { state, on, setPreview, step, tryOut } from "./talk.js";
+import { sketched, state, on, setPreview, step, tryOut } from "./talk.js";
+import { shownAgain } from "./plots.js";
+import { open } from "./tabs.js";
 import { byId, element, show, significant, sized } from "./words.js";
 
 let terms = 0;
@@ -71,10 +73,61 @@ function draft() {
     : [{ field: `shape.${i}.start`, message: "the search must begin somewhere", help: "write a number that may be about right" }]));
   if (missing.length) throw { mistakes: missing };
   return {
+    ...(kept.per ? { per: kept.per } : {}), says: kept.says ?? "", look: kept.look ?? "",
     id: byId("draft-id").value.trim(), name: byId("draft-name").value.trim(), at: byId("draft-at").value,
-    terms: rows.map((box) => ({ parameter: word(box, "parameter").trim(), unit: word(box, "unit"), dof: word(box, "dof"), formula: word(box, "formula") })),
+    terms: rows.map((box) => ({ parameter: word(box, "parameter").trim(), unit: word(box, "unit"), dof: word(box, "dof"), formula: word(box, "formula"), ...(box.dataset.typical ? { typical: Number(box.dataset.typical) } : {}) })),
     shape: numbers.map((box) => ({ parameter: word(box, "parameter").trim(), unit: word(box, "unit"), start: limit(box, "start"), min: limit(box, "min"), max: limit(box, "max") })),
   };
+}
+
+/** What a sketch says beside the fields of the form. */
+let kept = {};
+
+export function openFormula() {
+  open("plots");
+  const isOpen = byId("formula").hidden;
+  byId("formula").hidden = !isOpen;
+  byId("multiples").hidden = isOpen;
+  byId("own-formula").setAttribute("aria-expanded", String(isOpen));
+  shownAgain();
+  if (isOpen) {
+    byId("draft-terms").querySelector("input.formula")?.focus();
+    look();
+  } else {
+    looks += 1;
+    setPreview(null);
+    byId("own-formula").focus();
+  }
+}
+
+/** Fills the form with the program's starting formula, and draws its curve. */
+export async function sketch() {
+  if (byId("formula").hidden) openFormula();
+  clear();
+  show("draft-answer", "looking for a formula …");
+  looks += 1;
+  try {
+    const { draft: made, says } = await sketched();
+    kept = made;
+    byId("draft-id").value = made.id;
+    byId("draft-name").value = made.name;
+    byId("draft-at").value = made.at;
+    show("draft-at-says", says);
+    byId("draft-terms").replaceChildren();
+    byId("draft-shapes").replaceChildren();
+    for (const t of made.terms) {
+      const box = term(t.formula);
+      for (const field of ["parameter", "unit", "dof"]) box.querySelector(`[data-word=${field}]`).value = t[field];
+      if (t.typical) box.dataset.typical = t.typical;
+    }
+    for (const s of made.shape) {
+      const box = shape();
+      for (const field of ["parameter", "unit", "start", "min", "max"]) box.querySelector(`[data-word=${field}]`).value = s[field] ?? "";
+    }
+    await look();
+  } catch (error) {
+    failed(error);
+  }
 }
 
 function clear() {
@@ -154,9 +207,13 @@ async function save(isOn) {
     failed(error);
     return;
   }
-  if (await step({ save: { draft: wanted, on: isOn } })) show("draft-answer", `saved in ${state.inputs.effects_file}`);
+  const saved = await step({ save: { draft: wanted, on: isOn } });
+  if (saved && isOn) openFormula();
+  else if (saved) show("draft-answer", `saved in ${state.inputs.effects_file}`);
 }
 
+byId("formula-close").addEventListener("click", openFormula);
+byId("formula").addEventListener("keydown", (e) => { if (e.key === "Escape") openFormula(); });
 byId("draft").addEventListener("submit", (e) => { e.preventDefault(); look(); });
 byId("draft-terms").addEventListener("input", typing);
 byId("draft-shapes").addEventListener("input", typing);

@@ -1,34 +1,83 @@
-// The residual of every touch against what it may depend on, and the ladder. One touch is the same touch in every plot.
+// The one large plot: the residual of every touch against one variable, with the curve of the candidate that is looked at.
+// When the model changes the marks fall to their new places, and the old ones stay as ghosts.
 
 import { frame, unframe } from "./frame.js";
 import { later, never } from "./later.js";
 import { state, on, setPreview } from "./talk.js";
-import { byId, colour, element, significant } from "./words.js";
+import { byId, colour, element, show } from "./words.js";
 
-const DIRECTIONS = ["X", "Y", "Z"];
+export const DIRECTIONS = ["X", "Y", "Z"];
 const SYMBOLS = ["circle", "square", "triangle-up"];
 /** Above so many touches the graphics card draws the marks, small and plain: elements of the page would take seconds. */
 const MANY = 2500;
+/** How long the marks fall, ms. */
+const FALL = 350;
+/** More different values than this are put into bins. */
+const MOST_POSITIONS = 40;
 
-const cells = [];
+const box = byId("residuals");
+const plot = element("div", { class: "plot", role: "group" });
+const ring = element("div", { class: "ring", hidden: true });
+const cell = element("div", { class: "cell" }, plot, ring);
+box.append(cell);
+
 let scale = 1;
-/** By touch: direction in R, its sign, and place in its trace. */
-let sides = [];
-/** The touches of each direction, in their order. */
+let made = false;
+let stale = true;
+/** The variable that the person chose; none: the program's choice. */
+let wanted = null;
+/** The program's choice. It stays while the marks fall, so that one sees them fall. */
+let proposed = null;
+let shownDirections = new Set([0, 1, 2]);
+/** Residuals of the model before this one. */
+let ghosts = null;
+/** By touch: direction in R and its sign. */
+export let sides = [];
 let members = [[], [], []];
 const picked = new Set();
 const pickListeners = [];
 const hoverListeners = [];
+const axisListeners = [];
 
 export const onPick = (listener) => pickListeners.push(listener);
 export const onHover = (listener) => hoverListeners.push(listener);
+export const onAxis = (listener) => axisListeners.push(listener);
 export const chosen = () => picked;
+export const membersOf = (d) => members[d];
+
+/** The variable on the horizontal axis. */
+export function variable() {
+  const all = state.inputs?.variables ?? [];
+  const id = wanted ?? proposed;
+  return all.find((v) => v.id === id) ?? all[0];
+}
+
+/** Takes the variable on which the residual of the present model depends most, where the person has chosen none. */
+export function follow() {
+  if (wanted || proposed === state.live.axis) return;
+  proposed = state.live.axis;
+  ghosts = null;
+  stale = true;
+  drawIfSeen();
+  axisListeners.forEach((listener) => listener());
+}
+
+/** Chooses what the residual is drawn against, and in which directions. */
+export function lookAt(id, directions = null) {
+  wanted = id;
+  if (directions) shownDirections = new Set(directions);
+  ghosts = null;
+  stale = true;
+  drawDirections();
+  drawIfSeen();
+  axisListeners.forEach((listener) => listener());
+}
 
 export function choose(touches, add = false) {
   if (!add) picked.clear();
   for (const i of touches) picked.add(i);
-  cells.forEach((cell) => { cell.stale = true; });
-  drawSeen();
+  stale = true;
+  drawIfSeen();
   pickListeners.forEach((listener) => listener(picked));
 }
 
@@ -38,195 +87,228 @@ export function unchoose(i) {
 }
 
 export function hover(i) {
-  const t = state.inputs?.touches;
-  for (const cell of cells) {
-    const x = i === null || !t ? null : values(cell.variable.id)[i];
-    const area = cell.plot._fullLayout;
-    if (x === null || x === undefined || !area?.xaxis) {
-      cell.ring.hidden = true;
-      continue;
-    }
-    const y = state.live.residual_um[i] * sides[i].sign;
-    const left = area.xaxis._offset + area.xaxis.l2p(x);
-    const top = area.yaxis._offset + area.yaxis.l2p(y);
-    cell.ring.hidden = !Number.isFinite(left + top);
-    cell.ring.style.left = `${left}px`;
-    cell.ring.style.top = `${top}px`;
+  const area = plot._fullLayout;
+  const x = i === null || !state.inputs ? null : values(variable().id)[i];
+  if (x === null || x === undefined || !area?.xaxis?.l2p) {
+    ring.hidden = true;
+  } else {
+    const left = area.xaxis._offset + area.xaxis.l2p(x + shift(i));
+    const top = area.yaxis._offset + area.yaxis.l2p(state.live.residual_um[i] * sides[i].sign);
+    ring.hidden = !Number.isFinite(left + top);
+    ring.style.left = `${left}px`;
+    ring.style.top = `${top}px`;
   }
   hoverListeners.forEach((listener) => listener(i));
 }
 
-function values(id) {
+let order = [];
+
+/** The variable at every touch. */
+export function values(id) {
   const t = state.inputs.touches;
   if (id === "time") return t.time_h;
   if (id === "approach") return t.approach_deg;
-  if (id === "order") return cellsOrder(t.n);
+  if (id === "stylus") return t.stylus_mm;
+  if (id === "order") {
+    if (order.length !== t.n) order = Array.from({ length: t.n }, (_, i) => i + 1);
+    return order;
+  }
   return t.axes[id];
 }
 
-let order = [];
-function cellsOrder(n) {
-  if (order.length !== n) order = Array.from({ length: n }, (_, i) => i + 1);
-  return order;
-}
-
 export function layoutOf(more) {
-  const ink = colour("ink");
-  const axis = { gridcolor: colour("line"), zerolinecolor: colour("soft"), linecolor: colour("soft") };
+  const axis = { gridcolor: colour("grid"), zerolinecolor: colour("muted"), linecolor: colour("muted") };
   return {
-    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: ink, size: 12 },
-    margin: { l: 50, r: 10, t: 8, b: 40 }, showlegend: false, hovermode: "closest", ...more,
+    paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: colour("ink"), size: 12 },
+    margin: { l: 54, r: 10, t: 8, b: 42 }, showlegend: false, hovermode: "closest", ...more,
     xaxis: { ...axis, ...more.xaxis }, yaxis: { ...axis, ...more.yaxis },
   };
 }
 
-const CONFIG = {
-  responsive: true, displaylogo: false,
-  modeBarButtonsToRemove: ["toImage", "autoScale2d", "zoomIn2d", "zoomOut2d"],
-};
-
-function grid() {
-  const box = byId("residuals");
-  cells.forEach((cell) => Plotly.purge(cell.plot));
-  cells.length = 0;
-  box.replaceChildren();
-  for (const variable of state.inputs.variables) {
-    const plot = element("div", { class: "plot", role: "group", "aria-label": `residual against ${variable.title}` });
-    const ring = element("div", { class: "ring", hidden: true });
-    const around = element("div", { class: "cell" }, plot, ring);
-    const cell = { variable, plot, ring, around, stale: true, seen: false, made: false };
-    plot.dataset.variable = variable.id;
-    // who points at a mark means that of the library, which knows its touch
-    plot.addEventListener("pointerenter", () => { if (cell.stale && cell.made) draw(cell); });
-    box.append(around);
-    cells.push(cell);
-    watcher.observe(plot);
-  }
-}
-
-const watcher = new IntersectionObserver((entries) => {
-  for (const entry of entries) {
-    const cell = cells.find((c) => c.plot === entry.target);
-    if (!cell) continue;
-    cell.seen = entry.isIntersecting;
-    // a browser has few places for drawings by the graphics card: what is out of sight gives its own back
-    if (!cell.seen && cell.made && isMany()) {
-      Plotly.purge(cell.plot);
-      cell.made = false;
-      cell.stale = true;
-    }
-  }
-  drawSeen();
-}, { rootMargin: "40px" });
+const CONFIG = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["toImage", "autoScale2d", "zoomIn2d", "zoomOut2d"], modeBarButtonsToAdd: ["select2d", "lasso2d"] };
 
 const isMany = () => (state.inputs?.touches.n ?? 0) > MANY;
+const seen = () => byId("plots").hidden === false;
 
-/** Only what is on the screen is drawn; the rest when it comes into sight. */
-function drawSeen() {
-  if (!state.live || !state.inputs) return;
-  for (const cell of cells) if (cell.seen && cell.stale) draw(cell);
-}
-
-/** The marks go to their new places at once; the library draws after the paint, one plot a turn. */
-function moveSeen() {
-  for (const cell of cells) {
-    if (!cell.seen) continue;
-    if (!cell.made || !frame(cell.plot, cell.around, traces(cell), 2 * state.live.noise_um)) {
-      draw(cell);
-      continue;
-    }
-    cell.plot.dataset.framed = state.live.version;
-    later(`plot ${cell.variable.id}`, () => { if (cell.seen && cell.stale) draw(cell); });
+/** The different values of the variable, ascending; none where there are too many. */
+let positionsOf = { id: null, inputs: null, all: null };
+export function positions(id) {
+  if (positionsOf.id === id && positionsOf.inputs === state.inputs) return positionsOf.all;
+  const sorted = Float64Array.from(values(id).filter((v) => v !== null)).sort();
+  const same = 1e-3 * (sorted[sorted.length - 1] - sorted[0]);
+  let all = [];
+  for (const v of sorted) {
+    if (!all.length || v - all[all.length - 1] > same) all.push(v);
+    if (all.length > MOST_POSITIONS) { all = null; break; }
   }
+  positionsOf = { id, inputs: state.inputs, all };
+  return all;
 }
 
-function traces(cell) {
+/** Sideways step by direction of approach: marks at one position do not cover each other. */
+function shift(i) {
+  const all = positions(variable().id);
+  if (!all || all.length < 2) return 0;
+  const gap = Math.max((all[all.length - 1] - all[0]) / 60, Math.min(...all.slice(1).map((v, k) => v - all[k])) * 0.5);
+  return gap * (((sides[i].d * 2 + (sides[i].sign < 0 ? 0 : 1)) - 2.5) / 6);
+}
+
+/** How well a mark may be seen: many marks are pale. */
+function pale(n) {
+  return n <= 250 ? 0.85 : n <= 1000 ? 0.5 : n <= MANY ? 0.35 : 0.18;
+}
+
+function traces(residual = state.live.residual_um) {
   const { live, preview } = state;
-  const x = values(cell.variable.id);
+  const x = values(variable().id);
+  const n = state.inputs.touches.n;
   const many = isMany();
   const marks = many ? "scattergl" : "scatter";
   const out = new Map(live.rejected);
   const shown = [];
   for (const [d, name] of DIRECTIONS.entries()) {
-    const own = members[d].filter((i) => !out.has(i));
-    const selected = picked.size ? own.flatMap((i, k) => (picked.has(i) ? [k] : [])) : null;
+    if (!shownDirections.has(d)) continue;
+    const own = members[d].filter((i) => !out.has(i) && x[i] !== null);
+    const at = own.map((i) => x[i] + shift(i));
+    if (ghosts) {
+      shown.push({ type: marks, mode: "markers", name: "before", hoverinfo: "skip", x: at, y: own.map((i) => ghosts[i] * sides[i].sign),
+        marker: { color: colour("ghost"), symbol: SYMBOLS[d], size: many ? 3 : 5, opacity: many ? 0.25 : 0.6 } });
+    }
     shown.push({
-      type: marks, mode: "markers", name, customdata: own, selectedpoints: selected,
-      x: own.map((i) => x[i]), y: own.map((i) => live.residual_um[i] * sides[i].sign),
-      marker: { color: colour(name.toLowerCase()), symbol: SYMBOLS[d], size: many ? 5 : 6, opacity: many ? 0.6 : 0.8 },
+      type: marks, mode: "markers", name, customdata: own, selectedpoints: picked.size ? own.flatMap((i, k) => (picked.has(i) ? [k] : [])) : null,
+      x: at, y: own.map((i) => residual[i] * sides[i].sign),
+      marker: { color: colour(name.toLowerCase()), symbol: SYMBOLS[d], size: many ? 4 : n > 300 ? 5 : 7, opacity: pale(n) },
       hovertemplate: `%{y:.2f} µm in ${name}<extra></extra>`,
     });
   }
-  for (const [d, name] of preview ? DIRECTIONS.entries() : []) {
-    shown.push({
-      type: marks, mode: "lines", name: `${name} with it`, hoverinfo: "skip",
-      ...curve(members[d].filter((i) => !out.has(i)), x, preview.curve_um),
-      line: { color: colour(name.toLowerCase()), width: 2.5, dash: ["solid", "dash", "dot"][d] },
-    });
-  }
-  const gone = [...out.keys()];
+  const gone = [...out.keys()].filter((i) => shownDirections.has(sides[i].d));
   if (gone.length) {
     shown.push({
-      type: marks, mode: "markers", name: "not used", customdata: gone,
-      selectedpoints: picked.size ? gone.flatMap((i, k) => (picked.has(i) ? [k] : [])) : null,
-      x: gone.map((i) => x[i]), y: gone.map((i) => live.residual_um[i] * sides[i].sign),
-      marker: { color: colour("soft"), symbol: "x-thin-open", size: 8 },
-      hovertemplate: "%{y:.2f} µm, not used<extra></extra>",
+      type: marks, mode: "markers", name: "not used", customdata: gone, selectedpoints: picked.size ? gone.flatMap((i, k) => (picked.has(i) ? [k] : [])) : null,
+      x: gone.map((i) => x[i]), y: gone.map((i) => residual[i] * sides[i].sign),
+      marker: { color: colour("muted"), symbol: "x-thin-open", size: 8 }, hovertemplate: "%{y:.2f} µm, not used<extra></extra>",
+    });
+  }
+  return { marks: shown, lines: [...medians(x, residual, out), ...(preview ? curves(x, preview.curve_um, out) : [])] };
+}
+
+/** Touches of one position, or of one bin, with their mean position. */
+export function groups(own, x, most = MOST_POSITIONS) {
+  const filled = own.filter((i) => x[i] !== null);
+  if (!filled.length) return [];
+  const sorted = [...filled].sort((a, b) => x[a] - x[b]);
+  const [low, high] = [x[sorted[0]], x[sorted[sorted.length - 1]]];
+  const same = 1e-3 * (high - low);
+  let all = [];
+  for (const i of sorted) {
+    const last = all[all.length - 1];
+    if (last && x[i] - x[last[0]] <= same) last.push(i);
+    else all.push([i]);
+  }
+  if (all.length > most) {
+    const size = Math.ceil(sorted.length / Math.min(24, most));
+    all = Array.from({ length: Math.ceil(sorted.length / size) }, (_, k) => sorted.slice(k * size, (k + 1) * size));
+  }
+  return all.map((of) => ({ of, x: of.reduce((s, i) => s + x[i], 0) / of.length }));
+}
+
+const quantile = (sorted, q) => sorted[Math.min(sorted.length - 1, Math.max(0, Math.round(q * (sorted.length - 1))))];
+
+/** Medians with bars from the 16th to the 84th percentile, where many touches share a position. */
+function medians(x, residual, out) {
+  if (state.inputs.touches.n <= 150) return [];
+  const shown = [];
+  for (const [d, name] of DIRECTIONS.entries()) {
+    if (!shownDirections.has(d)) continue;
+    const each = groups(members[d].filter((i) => !out.has(i)), x).filter((g) => g.of.length >= 4);
+    if (each.length < 2) continue;
+    const ys = each.map((g) => g.of.map((i) => residual[i] * sides[i].sign).sort((a, b) => a - b));
+    const y = ys.map((v) => quantile(v, 0.5));
+    const lane = (k) => each[k].x + (positions(variable().id) ? shift(each[k].of[0]) : 0);
+    shown.push({
+      type: "scatter", mode: "markers", name: `median ${name}`, x: each.map((_, k) => lane(k)), y,
+      error_y: { type: "data", symmetric: false, array: ys.map((v, k) => quantile(v, 0.84) - y[k]), arrayminus: ys.map((v, k) => y[k] - quantile(v, 0.16)), color: colour(name.toLowerCase()), thickness: 1.5, width: 3 },
+      marker: { symbol: SYMBOLS[d], size: 9, color: colour("paper"), line: { color: colour(name.toLowerCase()), width: 2 } },
+      hovertemplate: `median of ${name}: %{y:.2f} µm<extra></extra>`,
     });
   }
   return shown;
 }
 
 /** Mean of what an effect takes away at each value of the variable, in the direction that the touches show. */
-function curve(own, x, um) {
-  const at = new Map();
-  const filled = own.filter((i) => x[i] !== null);
-  if (!filled.length) return { x: [], y: [] };
-  const low = filled.reduce((m, i) => Math.min(m, x[i]), Infinity);
-  const high = filled.reduce((m, i) => Math.max(m, x[i]), -Infinity);
-  const width = (high - low) / 60 || 1;
-  for (const i of filled) {
-    const bin = Math.round((x[i] - low) / width);
-    const sum = at.get(bin) ?? { x: 0, y: 0, n: 0 };
-    sum.x += x[i];
-    sum.y += um[i] * sides[i].sign;
-    sum.n += 1;
-    at.set(bin, sum);
-  }
-  const sorted = [...at.values()].sort((a, b) => a.x / a.n - b.x / b.n);
-  return { x: sorted.map((s) => s.x / s.n), y: sorted.map((s) => s.y / s.n) };
+export function curvePoints(own, x, um, most) {
+  const each = groups(own, x, most);
+  return { x: each.map((g) => g.x), y: each.map((g) => g.of.reduce((s, i) => s + um[i] * sides[i].sign, 0) / g.of.length) };
 }
 
-function draw(cell) {
+function curves(x, um, out) {
+  return DIRECTIONS.flatMap((name, d) => (shownDirections.has(d) ? [{
+    type: "scatter", mode: "lines", name: `${name} with it`, hoverinfo: "skip", ...curvePoints(members[d].filter((i) => !out.has(i)), x, um, 60),
+    line: { color: colour(name.toLowerCase()), width: 3, dash: ["solid", "dash", "dot"][d] },
+  }] : []));
+}
+
+const bandOf = () => 2 * state.live.noise_um;
+
+function draw() {
   const { live } = state;
-  cell.stale = false;
-  never(`plot ${cell.variable.id}`);
-  const band = 2 * live.noise_um;
+  stale = false;
+  never("plot");
+  const { marks, lines } = traces();
   const layout = layoutOf({
-    dragmode: "zoom", uirevision: "keep", selectionrevision: live.version,
-    xaxis: { title: { text: cell.variable.title } },
-    yaxis: { title: { text: "residual, µm" }, range: [-scale, scale] },
-    shapes: [{ type: "rect", layer: "below", xref: "paper", x0: 0, x1: 1, y0: -band, y1: band, fillcolor: colour("band"), line: { width: 0 } }],
+    dragmode: "zoom", uirevision: variable().id, selectionrevision: live.version,
+    xaxis: { title: { text: variable().title } }, yaxis: { title: { text: "measured − model, µm" }, range: [-scale, scale] },
+    shapes: [{ type: "rect", layer: "below", xref: "paper", x0: 0, x1: 1, y0: -bandOf(), y1: bandOf(), fillcolor: colour("band"), line: { width: 0 } }],
+    annotations: [{ xref: "paper", x: 1, xanchor: "right", y: bandOf(), yanchor: "bottom", text: "twice the noise", showarrow: false, font: { size: 11, color: colour("muted") } }],
   });
-  const config = { ...CONFIG, modeBarButtonsToAdd: ["select2d", "lasso2d"] };
-  Plotly.react(cell.plot, traces(cell), layout, config);
-  unframe(cell.around);
-  cell.plot.dataset.version = live.version;
-  if (!cell.made) {
-    cell.made = true;
-    cell.plot.on("plotly_hover", (e) => {
-      const touch = e.points.find((p) => p.customdata !== undefined)?.customdata;
-      if (touch !== undefined) hover(touch);
-    });
-    cell.plot.on("plotly_unhover", () => hover(null));
-    cell.plot.on("plotly_selected", (e) => {
-      if (e) choose(e.points.filter((p) => p.customdata !== undefined).map((p) => p.customdata), true);
-    });
-    cell.plot.on("plotly_click", (e) => {
-      const touch = e.points.find((p) => p.customdata !== undefined)?.customdata;
-      if (touch !== undefined) picked.has(touch) ? unchoose(touch) : choose([touch], true);
-    });
-  }
+  plot.setAttribute("aria-label", `residual against ${variable().title}`);
+  plot.dataset.variable = variable().id;
+  Plotly.react(plot, [...marks, ...lines], layout, CONFIG);
+  unframe(cell);
+  plot.dataset.version = live.version;
+  plot.dataset.ghosts = String(Boolean(ghosts));
+  plot.dataset.curves = String(lines.filter((l) => l.mode === "lines" && l.x.length > 1).length);
+  if (made) return;
+  made = true;
+  const touchOf = (e) => e.points.find((p) => p.customdata !== undefined)?.customdata;
+  plot.on("plotly_hover", (e) => { const i = touchOf(e); if (i !== undefined) hover(i); });
+  plot.on("plotly_unhover", () => hover(null));
+  plot.on("plotly_selected", (e) => { if (e) choose(e.points.filter((p) => p.customdata !== undefined).map((p) => p.customdata), true); });
+  plot.on("plotly_click", (e) => { const i = touchOf(e); if (i !== undefined) picked.has(i) ? unchoose(i) : choose([i], true); });
+}
+
+export function drawIfSeen() {
+  if (state.live && state.inputs && stale && seen()) draw();
+}
+
+/** The panel has come into sight. */
+export function shownAgain() {
+  stale = true;
+  drawIfSeen();
+}
+
+// the large plot fills what the rest of the page leaves it
+new ResizeObserver(() => { if (made && seen()) Plotly.Plots.resize(plot); }).observe(box);
+
+const still = matchMedia("(prefers-reduced-motion: reduce)");
+let falling = 0;
+
+/** The marks fall from the old residuals to the new ones on a canvas; then the library draws the same. */
+function fall(from) {
+  const mine = ++falling;
+  const to = state.live.residual_um;
+  const began = performance.now();
+  const turn = () => {
+    if (mine !== falling) return;
+    const t = still.matches || !from ? 1 : Math.min(1, (performance.now() - began) / FALL);
+    const eased = 1 - (1 - t) ** 3;
+    const at = t === 1 ? to : to.map((r, i) => from[i] + (r - from[i]) * eased);
+    if (!frame(plot, cell, traces(at).marks, bandOf())) return draw();
+    plot.dataset.framed = state.live.version;
+    if (t < 1) requestAnimationFrame(turn);
+    else later("plot", () => { if (stale && mine === falling) draw(); });
+  };
+  turn();
 }
 
 export function rescale() {
@@ -235,8 +317,16 @@ export function rescale() {
   let top = 2 * live.noise_um;
   live.residual_um.forEach((r, i) => { if (!out.has(i)) top = Math.max(top, Math.abs(r)); });
   scale = 1.1 * top;
-  cells.forEach((cell) => { cell.stale = true; });
-  drawSeen();
+  ghosts = null;
+  stale = true;
+  drawIfSeen();
+}
+
+function drawDirections() {
+  const only = (d) => shownDirections.size === 1 && shownDirections.has(d);
+  const button = (name, isOn, directions, text) => element("button", { type: "button", class: name, "aria-pressed": String(isOn), click: () => lookAt(wanted, directions) }, text);
+  byId("directions").replaceChildren(button("all", shownDirections.size === 3, [0, 1, 2], "all"),
+    ...DIRECTIONS.map((name, d) => button(name, only(d), [d], `${"●■▲"[d]} ${name}`)));
 }
 
 function sort(t) {
@@ -251,74 +341,44 @@ function sort(t) {
 }
 
 let drawnInputs = null;
-let shown = 0;
-on("live", (live, newer, first) => {
-  if (drawnInputs !== state.inputs) {
+let shownVersion = 0;
+let last = null;
+on("live", (live, newer) => {
+  const anew = drawnInputs !== state.inputs;
+  if (anew) {
     drawnInputs = state.inputs;
     sort(state.inputs.touches);
     picked.clear();
-    grid();
+    last = null;
+    wanted = null;
+    proposed = live.axis;
     rescale();
+    drawDirections();
   }
-  if (newer) {
-    cells.forEach((cell) => { cell.stale = true; });
-    shown = live.version;
-    moveSeen();
-    hover(null);
-  }
-  later("ladder", showLadder);
+  if (!newer) return;
+  const comparable = last && last.length === live.residual_um.length ? last : null;
+  last = live.residual_um;
+  shownVersion = live.version;
+  ghosts = comparable;
+  // a new model may depend on something else: what the person chose stays
+  stale = true;
+  hover(null);
+  if (!seen()) return;
+  if (made && comparable) fall(comparable);
+  else draw();
 });
-
-/** The ladder is drawn when it is in sight and has changed. */
-let ladderSeen = false;
-let ladderDrawn = "";
-function showLadder(again = false) {
-  if (!state.live || !ladderSeen) return;
-  const now = JSON.stringify(state.live.ladder);
-  if (now === ladderDrawn && !again) return;
-  ladderDrawn = now;
-  ladder(state.live);
-}
-new IntersectionObserver((entries) => {
-  ladderSeen = entries[entries.length - 1].isIntersecting;
-  showLadder();
-}, { rootMargin: "200px" }).observe(byId("ladder"));
 on("preview", () => {
   // a step takes the curve away with all that it draws anew
-  if (state.live?.version !== shown) return;
-  cells.forEach((cell) => { cell.stale = true; });
-  drawSeen();
+  if (state.live?.version !== shownVersion) return;
+  stale = true;
+  drawIfSeen();
 });
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-  cells.forEach((cell) => { cell.stale = true; });
-  drawSeen();
-  showLadder(true);
-});
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { stale = true; drawIfSeen(); });
 document.addEventListener("keydown", (e) => {
   if (e.key === "Escape" && state.preview) setPreview(null);
 });
-
-function ladder(live) {
-  const steps = live.ladder.steps;
-  const label = (s, i) => {
-    const parts = [...s.added.map((e) => `+${e}`), ...s.removed.map((e) => `−${e}`)];
-    return `${i + 1}. ${parts.join(" ") || (i ? "the same effects" : "first model")}`;
-  };
-  const names = steps.map(label);
-  const line = (name, key, dash, symbol) => ({
-    type: "scatter", mode: "lines+markers", name, x: names, y: steps.map((s) => s[key] ?? null), line: { dash, color: colour(key === "rms_um" ? "x" : "y") },
-    marker: { symbol, size: 8 }, hovertemplate: `%{y:.3f} µm<extra>${name}</extra>`,
-  });
-  const layout = layoutOf({
-    showlegend: true, legend: { orientation: "h", y: 1.2 },
-    xaxis: { tickangle: -20, type: "category", automargin: true },
-    yaxis: { title: { text: "µm RMS" }, type: "log" },
-    shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: live.noise_um, y1: live.noise_um, line: { dash: "dot", color: colour("soft") } }],
-    annotations: [{ xref: "paper", x: 0, xanchor: "left", y: Math.log10(live.noise_um), yanchor: "bottom", bgcolor: colour("paper"), text: "noise of a touch", showarrow: false }],
-  });
-  Plotly.react(byId("ladder"), [line("residual", "rms_um", "solid", "circle"), line("cross-validated", "held_out_rms_um", "dash", "square")], layout, { ...CONFIG, displayModeBar: false });
-  const head = element("tr", {}, ["model", "residual, µm", "cross-validated, µm", "χ²/dof"].map((h) => element("th", { scope: "col" }, h)));
-  const rows = steps.map((s, i) => element("tr", {}, [names[i], significant(s.rms_um), significant(s.held_out_rms_um), significant(s.chi2_per_dof)].map((v) => element("td", {}, v))));
-  const table = byId("ladder-table");
-  table.replaceChildren(table.caption, element("thead", {}, head), element("tbody", {}, rows));
-}
+onHover((i) => {
+  const t = state.inputs?.touches;
+  show("hovered", i === null || !t ? "" : `touch ${t.id[i]} of run ${t.run[i]}: ${(state.live.residual_um[i]).toFixed(2)} µm, ${t.words[t.block[i]]}, face ${t.words[t.face[i]]}, log line ${t.line[i]}`);
+});
+byId("rescale").addEventListener("click", rescale);

@@ -1,9 +1,11 @@
-// The blocks with the residual of every touch as an arrow, magnified.
+// The machine with the residual of every touch as an arrow, magnified; a slider goes through the index positions.
 
 import { later } from "./later.js";
 import { state, on } from "./talk.js";
 import { layoutOf, onHover } from "./plots.js";
 import { byId, colour, show, significant } from "./words.js";
+
+const slider = byId("pose");
 
 let stale = true;
 let seen = false;
@@ -52,18 +54,28 @@ function outline(solid) {
   return lines;
 }
 
+/** A point, or with `turn` a direction, moved with its carrier into the frame of the machine. */
+function moved(p, frame, turn = false) {
+  if (!frame) return p;
+  return [0, 1, 2].map((r) => frame[4 * r] * p[0] + frame[4 * r + 1] * p[1] + frame[4 * r + 2] * p[2] + (turn ? 0 : frame[4 * r + 3]));
+}
+
 const columns = (points) => ({ x: points.map((p) => p && p[0]), y: points.map((p) => p && p[1]), z: points.map((p) => p && p[2]) });
 
 function draw() {
   if (!stale || !seen || !state.live) return;
   stale = false;
   if (!webgl()) {
-    box.textContent = "this browser draws no 3D (WebGL is off): the plots above show the same touches";
+    box.textContent = "this browser draws no 3D (WebGL is off): the plot of residuals shows the same touches";
     return;
   }
   const { live, inputs } = state;
   const t = inputs.touches;
   const out = new Set(live.rejected.map(([i]) => i));
+  const pose = Number(slider.value) > 0 ? inputs.machine.poses[Number(slider.value) - 1] : null;
+  show("pose-says", pose ? `${slider.value} of ${inputs.machine.poses.length}: ${pose.says}` : "all, axes at zero");
+  const frameOf = (carrier) => pose?.frames[carrier];
+  const at = t.point.map((p, i) => moved(p, frameOf(t.words[t.carrier[i]])));
   const spread = [0, 1, 2].map((k) => {
     let low = Infinity, high = -Infinity;
     for (const p of t.point) { low = Math.min(low, p[k]); high = Math.max(high, p[k]); }
@@ -76,14 +88,15 @@ function draw() {
   const power = 10 ** Math.floor(Math.log10(wish));
   const times = Math.floor(wish / power) * power;
   const arrows = [], tips = [];
-  t.point.forEach((p, i) => {
-    if (out.has(i)) return;
-    const tip = p.map((v, k) => v + t.normal[i][k] * live.residual_um[i] * 1e-3 * times);
+  const kept = t.point.map((_, i) => i).filter((i) => !out.has(i) && (!pose || t.visit[i] === pose.visit));
+  kept.forEach((i) => {
+    const p = at[i];
+    const normal = moved(t.normal[i], frameOf(t.words[t.carrier[i]]), true);
+    const tip = p.map((v, k) => v + normal[k] * live.residual_um[i] * 1e-3 * times);
     arrows.push(p, tip, null);
     tips.push(tip);
   });
-  const kept = t.point.map((_, i) => i).filter((i) => !out.has(i));
-  const machine = inputs.machine.solids.flatMap(outline);
+  const machine = inputs.machine.solids.flatMap((s) => outline(s).map((p) => p && moved(p, frameOf(s.carrier))));
   const line = (points, name, style) => ({ type: "scatter3d", mode: "lines", name, ...columns(points), line: style, hoverinfo: "skip" });
   const traces = [
     line(machine, inputs.machine.name, { color: colour("line"), width: 2 }),
@@ -92,11 +105,12 @@ function draw() {
       text: kept.map((i) => `touch ${t.id[i]} of run ${t.run[i]}: ${significant(live.residual_um[i])} µm`), hoverinfo: "text" },
     { type: "scatter3d", mode: "markers", name: "the touch", x: [null], y: [null], z: [null], marker: { size: 8, color: colour("ink"), symbol: "circle-open" }, hoverinfo: "skip" },
   ];
-  // the touches fill the picture; the table may be cut
-  const half = 0.75 * Math.max(...spread, 1);
+  // touches and arrows stay large enough to be seen: of a large machine only the middle is shown
+  const reach = machine.reduce((far, p) => (p ? Math.max(far, ...p.map((v, k) => Math.abs(v - at[0][k]))) : far), 0);
+  const half = Math.max(0.75 * Math.max(...spread, 1), Math.min(reach, 1.6 * Math.max(...spread, 1)));
   const middle = [0, 1, 2].map((k) => {
     let low = Infinity, high = -Infinity;
-    for (const p of t.point) { low = Math.min(low, p[k]); high = Math.max(high, p[k]); }
+    for (const p of at) { low = Math.min(low, p[k]); high = Math.max(high, p[k]); }
     return (low + high) / 2;
   });
   const axis = (title, k) => ({ range: [middle[k] - half, middle[k] + half], title: { text: title }, color: colour("ink"), gridcolor: colour("line"), backgroundcolor: colour("paper") });
@@ -107,8 +121,10 @@ function draw() {
   delete layout.xaxis;
   delete layout.yaxis;
   Plotly.react(box, traces, layout, { responsive: true, displaylogo: false, displayModeBar: false });
-  show("space-scale", `Arrows are ${times.toLocaleString("en")} times as long as the residual: ${significant(top)} µm are drawn as ${significant(top * 1e-3 * times)} mm. Blocks as the plan has them, all axes at zero.`);
+  show("space-scale", `Arrows are ${times.toLocaleString("en")} times as long as the residual: ${significant(top)} µm are drawn as ${significant(top * 1e-3 * times)} mm. Touches as the plan has them.`);
 }
+
+slider.addEventListener("input", () => { stale = true; draw(); });
 
 onHover((i) => {
   if (!seen || !possible || stale || box.data === undefined) return;
@@ -122,6 +138,7 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
 });
 on("live", (live, newer) => {
   if (!newer) return;
+  slider.max = state.inputs.machine.poses.length;
   stale = true;
   later("space", draw);
 });

@@ -40,7 +40,7 @@ async function ask(path, body) {
   } catch {
     answer = { messages: [{ message: text || `answer ${response.status}` }] };
   }
-  if (!response.ok) throw { status: response.status, ...answer };
+  if (!response.ok || answer.error) throw { status: response.status, ...answer };
   return answer;
 }
 
@@ -110,6 +110,15 @@ export async function tryOut(what) {
   if (mine === tries && found.version === state.live.version) setPreview(found);
   return found;
 }
+
+/** The same for a small picture: what is shown over the plot stays. */
+export async function glance(effect) {
+  const found = await ask("/api/try", { version: state.live.version, effect });
+  return found.version === state.live.version ? found : null;
+}
+
+/** A starting formula for what no known effect explains. */
+export const sketched = () => ask("/api/sketch", { version: state.live.version });
 
 export function setPreview(found) {
   if (found === null) tries += 1;

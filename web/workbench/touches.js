@@ -105,7 +105,4 @@ onPick(() => { draw(); count(); });
 onHover((i) => {
   for (const row of rows.values()) row.classList.remove("hot");
   rows.get(i)?.classList.add("hot");
-  const t = state.inputs?.touches;
-  show("hovered", i === null || !t ? "no touch under the pointer"
-    : `touch ${t.id[i]} of run ${t.run[i]}: ${significant(state.live.residual_um[i])} µm, block ${t.words[t.block[i]]}, face ${t.words[t.face[i]]}, line ${t.line[i]} of the log`);
 });

@@ -17,9 +17,12 @@ export function significant(value, digits = 3) {
   return size < -5 || size > 6 ? value.toExponential(digits - 1) : value.toFixed(Math.max(0, digits - 1 - size));
 }
 
+/** A unit as people write it. */
+export const unitOf = (unit) => unit.replace(/^u(?=m|rad)/, "µ").replace("deg", "°");
+
 /** A result with its uncertainty; without one it is none. */
 export function sized(p) {
-  return p.sigma ? `${p.name} = ${stated(p.value, p.sigma)} ± ${significant(p.sigma, 2)} ${p.unit}` : `${p.name}: not determined`;
+  return p.sigma ? `${p.name} = ${stated(p.value, p.sigma)} ± ${significant(p.sigma, 2)} ${unitOf(p.unit)}` : `${p.name}: not determined`;
 }
 
 /** A probability; its natural logarithm where it is too small to be a number. */

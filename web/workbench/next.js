@@ -1,0 +1,76 @@
+// What to do next, as the program decided it, with a button where the page can do it itself.
+
+import { state, on, call, step, trouble } from "./talk.js";
+import { openFormula, sketch } from "./formula.js";
+import { byId, element } from "./words.js";
+
+/** Steps that are shown at once; the rest is behind a fold. */
+const FIRST = 3;
+
+const BUTTONS = {
+  add: (act) => ["Add it to the model", () => step({ switch: { effect: act.effect, on: true } })],
+  "measure-more": () => ["Write this program", () => byId("plan-next").click()],
+  export: () => ["Export the compensation", () => byId("export").click()],
+  sketch: () => ["Sketch it for me", sketch],
+};
+
+function card(next, isFirst) {
+  const [label, press] = BUTTONS[next.act.do]?.(next.act) ?? [];
+  return element("li", { "data-do": next.act.do }, element("strong", {}, next.what), element("p", {}, next.how),
+    label ? element("button", { type: "button", class: isFirst ? "primary" : null, click: press }, label) : null);
+}
+
+function draw() {
+  const { live, behind } = state;
+  const known = behind?.version === live.version && behind.complete;
+  const all = known ? behind.next : [];
+  // the first that the page can do is the coloured one
+  const main = all.findIndex((n) => n.act.do !== "nothing");
+  const cards = all.map((n, i) => card(n, i === main));
+  const rest = cards.slice(FIRST);
+  byId("advice").replaceChildren(...cards.slice(0, FIRST),
+    ...(rest.length ? [element("li", {}, element("details", {}, element("summary", {}, `${rest.length} more`), element("ol", {}, rest)))] : []),
+    ...(known ? [] : [element("li", {}, "searching …")]));
+  byId("advice").dataset.complete = String(known);
+}
+on("live", (live, newer) => { if (newer) draw(); });
+on("behind", draw);
+
+for (const verb of ["plan-next", "export"]) {
+  byId(verb).addEventListener("click", async () => {
+    const what = { verb, controller: byId("controller").value };
+    if (verb === "plan-next") what.minutes = Number(byId("minutes").value);
+    try {
+      trouble(null);
+      await call(what);
+    } catch (error) {
+      trouble(error);
+    }
+  });
+}
+on("live", () => {
+  const select = byId("controller");
+  if (select.options.length) return;
+  const last = state.inputs.runs[state.inputs.runs.length - 1]?.controller;
+  select.replaceChildren(...state.inputs.controllers.map((c) => element("option", { value: c, selected: c === last }, c)));
+});
+on("job", (job) => {
+  const at = byId("job");
+  at.dataset.state = !job ? "" : !job.answered && !job.failed.length ? "running" : job.answered?.code === 0 ? "done" : "failed";
+  if (!job) {
+    at.textContent = "";
+  } else if (at.dataset.state === "running") {
+    at.textContent = `${job.verb} is at work …`;
+  } else if (job.failed.length) {
+    at.textContent = job.failed.map((m) => m.message).join("\n");
+  } else {
+    const { answer, messages, folder, code } = job.answered;
+    const says = code === 0 ? `${job.verb}: written into ${folder} beside the study` : `${job.verb} could not be done`;
+    const more = job.verb === "plan-next" && answer?.touches ? `, ${answer.touches} touches, about ${Math.ceil(answer.time_s / 60)} min` : answer?.says ? `: ${answer.says}` : "";
+    const files = answer?.files ? `\n${answer.files.join(", ")}` : "";
+    at.textContent = `${says}${more}${files}${messages.length ? `\n${messages.join("\n")}` : ""}`;
+  }
+  for (const verb of ["plan-next", "export"]) byId(verb).disabled = at.dataset.state === "running";
+});
+byId("own-formula").addEventListener("click", openFormula);
+byId("sketch").addEventListener("click", sketch);
