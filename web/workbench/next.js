@@ -8,25 +8,29 @@ import { byId, element } from "./words.js";
 const FIRST = 3;
 
 const BUTTONS = {
-  add: (act) => ["Add it to the model", () => step({ switch: { effect: act.effect, on: true } })],
+  add: (act) => [`Add ${state.inputs.effects.find((e) => e.id === act.effect)?.name ?? act.effect}`, () => step({ switch: { effect: act.effect, on: true } })],
   "measure-more": () => ["Write this program", () => byId("plan-next").click()],
   export: () => ["Export the compensation", () => byId("export").click()],
   sketch: () => ["Sketch it for me", sketch],
 };
 
-function card(next, isFirst) {
+function button(next, isMain) {
   const [label, press] = BUTTONS[next.act.do]?.(next.act) ?? [];
-  return element("li", { "data-do": next.act.do }, element("strong", {}, next.what), element("p", {}, next.how),
-    label ? element("button", { type: "button", class: isFirst ? "primary" : null, click: press }, label) : null);
+  return label ? element("button", { type: "button", class: isMain ? "primary" : null, "data-do": next.act.do, click: press }, label) : null;
+}
+
+function card(next, isMain) {
+  return element("li", {}, element("strong", {}, next.what), element("p", {}, next.how), isMain ? null : button(next, false));
 }
 
 function draw() {
   const { live, behind } = state;
   const known = behind?.version === live.version && behind.complete;
   const all = known ? behind.next : [];
-  // the first that the page can do is the coloured one
+  // the first that the page can do stands above the reasons, in reach without scrolling
   const main = all.findIndex((n) => n.act.do !== "nothing");
   const cards = all.map((n, i) => card(n, i === main));
+  byId("main-step").replaceChildren(...(main < 0 ? [] : [button(all[main], true)]));
   const rest = cards.slice(FIRST);
   byId("advice").replaceChildren(...cards.slice(0, FIRST),
     ...(rest.length ? [element("li", {}, element("details", {}, element("summary", {}, `${rest.length} more`), element("ol", {}, rest)))] : []),
