@@ -317,6 +317,8 @@ struct Pose {
     says: String,
     /// By carrier: rows of rotation and translation, mm, of its frame in R.
     frames: BTreeMap<String, [f64; 12]>,
+    /// Pivot and ball of the nominal tool in R, mm, with the linear axes at the mean of their touches.
+    tool: [[f64; 3]; 2],
 }
 
 #[derive(Serialize)]
@@ -526,7 +528,13 @@ fn poses(now: &Snapshot) -> Vec<Pose> {
             let [a, b, c] = [row(0), row(1), row(2)];
             (name.clone(), [a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3], c[0], c[1], c[2], c[3]])
         });
-        Pose { visit, says: says.join(", "), frames: frames.collect() }
+        let tool_frame = machine.tool_frame(&at);
+        let ends = [machine.tool.pivot, machine.tool.ball_at_zero(machine.tool.length_mm)];
+        let tool = ends.map(|p| {
+            let p = crate::geometry::apply(&tool_frame, &p);
+            [p.x, p.y, p.z].map(|v| short(v, 1e3))
+        });
+        Pose { visit, says: says.join(", "), frames: frames.collect(), tool }
     };
     members.into_iter().map(pose).collect()
 }

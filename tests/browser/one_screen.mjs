@@ -72,8 +72,8 @@ async function marksFall(t) {
 async function machineIn3d(t) {
   const { page, seen } = await opened(t, "machine");
   await openView(page, "machine");
-  await page.waitForFunction(() => document.querySelector("#space").data?.length > 2);
-  const count = () => page.evaluate(() => document.querySelector("#space").data[2].x.length);
+  await page.waitForFunction(() => document.querySelector("#space").data?.length > 3);
+  const count = () => page.evaluate(() => document.querySelector("#space").data[3].x.length);
   const all = await count();
   const steps = Number(await page.getAttribute("#pose", "max"));
   holds(steps >= 3, `${steps} index positions`);

@@ -2,7 +2,7 @@
 
 import { appendFileSync, existsSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { RISE_H, accessible, axiscal, equal, holds, many, measured, picture, warming, watched, workbench } from "./tools.mjs";
+import { RISE_H, accessible, axiscal, equal, holds, many, measured, warming, watched, workbench } from "./tools.mjs";
 
 export const number = async (page, id) => Number(await page.textContent(`#${id}`));
 export const text = (folder) => readFileSync(join(folder, "study.toml"), "utf8");
@@ -50,7 +50,6 @@ async function wholeLoop(t) {
   const noise = await number(page, "noise");
   holds(before > 3 * noise, `the error before is ${before} µm against ${noise} µm`);
   const wide = await spread(page);
-  await picture(page, t, "workbench-before");
 
   // the first candidate is open without a click: what it is, and its curve over the touches
   const first = page.locator("#candidates > li").first();
@@ -63,7 +62,7 @@ async function wholeLoop(t) {
   equal(await page.locator(".details details").first().getAttribute("open"), null, "what to check at the machine is behind a click");
   // the horizontal axis is the one that says most: the table of shares has its largest value there
   equal(await page.getAttribute("#residuals .plot", "data-variable"), "C", "the axis that the program chose");
-  await picture(page, t, "workbench-candidate");
+  await page.screenshot({ path: join(t.out, "workbench-candidate.png") });
 
   // it is switched on
   await after(page, () => first.getByRole("switch").first().click());
@@ -80,7 +79,7 @@ async function wholeLoop(t) {
   await told(page);
   equal(await page.getAttribute("#verdict", "data-verdict"), "adequate", "verdict after");
   holds(await number(page, "held-out") < 2 * noise, "the error on index visits left out");
-  await picture(page, t, "workbench-after");
+  await page.screenshot({ path: join(t.out, "workbench-after.png") });
 
   // a click on a step of the ladder goes back to its model, and another one forth again
   await after(page, () => page.locator("#ladder button").first().click());
@@ -415,7 +414,7 @@ async function byKeyboardAndByEar(t) {
   equal(await page.evaluate(() => document.activeElement.getAttribute("role")), "switch");
   await after(page, () => page.keyboard.press("Space"));
   await page.waitForFunction(() => document.activeElement.dataset.switch === "squareness-xy" && document.activeElement.ariaChecked === "true");
-  await page.keyboard.press("Tab");
+  await page.keyboard.press("Shift+Tab");
   await page.keyboard.press("Enter");
   await page.waitForSelector(".details");
   await told(page);

@@ -22,9 +22,11 @@ function toggle(effect, isOn, disabled) {
     type: "button", role: "switch", "aria-checked": String(isOn), "aria-label": `${effect.name} (${effect.id})`, "data-switch": effect.id, disabled,
     click: async (e) => {
       const id = e.currentTarget.dataset.switch;
+      const byKey = e.detail === 0;
       await step({ switch: { effect: id, on: !isOn } });
       // the row has moved to the other list: the keyboard goes along
       draw();
+      if (byKey && !isOn) byId("model").open = true;
       document.querySelector(`[data-switch="${CSS.escape(id)}"]`)?.focus();
     },
   }, isOn ? "Remove" : "Add");
@@ -45,7 +47,9 @@ function standing(effect, score) {
   const first = found?.candidates[0];
   const isFirst = first?.effect === effect.id || first?.same_as.includes(effect.id);
   const extra = candidate(effect.id)?.proposed ? ", proposed" : score.passes && first?.proposed && !isFirst ? ", explains less than the first" : "";
-  const size = score.parameters[0];
+  // of several sizes the one that stands out most
+  const certainty = (p) => Math.abs(p.value) / p.sigma || 0;
+  const size = score.parameters.reduce((best, p) => (!best || certainty(p) > certainty(best) ? p : best), null);
   return `${score.likely}${extra}${size ? `; ${size.name} about ${stated(size.value, size.sigma)} ± ${significant(size.sigma, 2)} ${unitOf(size.unit)}` : ""}`;
 }
 

@@ -259,7 +259,7 @@ function draw() {
     dragmode: "zoom", uirevision: variable().id, selectionrevision: live.version,
     xaxis: { title: { text: variable().title } }, yaxis: { title: { text: "measured − model, µm" }, range: [-scale, scale] },
     shapes: [{ type: "rect", layer: "below", xref: "paper", x0: 0, x1: 1, y0: -bandOf(), y1: bandOf(), fillcolor: colour("band"), line: { width: 0 } }],
-    annotations: [{ xref: "paper", x: 1, xanchor: "right", y: bandOf(), yanchor: "bottom", text: "twice the noise", showarrow: false, font: { size: 11, color: colour("muted") } }],
+    annotations: [{ xref: "paper", x: 1, xanchor: "right", y: bandOf(), yanchor: "bottom", text: "twice the noise", showarrow: false, font: { size: 11, color: colour("muted") }, bgcolor: colour("paper"), opacity: 0.8 }],
   });
   plot.setAttribute("aria-label", `residual against ${variable().title}`);
   plot.dataset.variable = variable().id;

@@ -100,6 +100,7 @@ function draw() {
   const line = (points, name, style) => ({ type: "scatter3d", mode: "lines", name, ...columns(points), line: style, hoverinfo: "skip" });
   const traces = [
     line(machine, inputs.machine.name, { color: colour("line"), width: 2 }),
+    line(pose ? pose.tool : [], "probe from the pivot to the ball", { color: colour("muted"), width: 6 }),
     line(arrows, "residual", { color: colour("x"), width: 3 }),
     { type: "scatter3d", mode: "markers", name: "touches", ...columns(tips), customdata: kept, marker: { size: 2, color: colour("y") },
       text: kept.map((i) => `touch ${t.id[i]} of run ${t.run[i]}: ${significant(live.residual_um[i])} µm`), hoverinfo: "text" },
@@ -130,7 +131,7 @@ onHover((i) => {
   if (!seen || !possible || stale || box.data === undefined) return;
   const t = state.inputs.touches;
   const p = i === null ? [null, null, null] : t.point[i];
-  Plotly.restyle(box, { x: [[p[0]]], y: [[p[1]]], z: [[p[2]]] }, [3]);
+  Plotly.restyle(box, { x: [[p[0]]], y: [[p[1]]], z: [[p[2]]] }, [4]);
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   stale = true;
