@@ -95,7 +95,8 @@ impl Default for Colours {
 
 impl Colours {
     /// Rows of a group as those of its touches.
-    fn touches(&self, group: usize, rows: &DMatrix<f64>) -> DMatrix<f64> {
+    #[must_use]
+    pub fn touches(&self, group: usize, rows: &DMatrix<f64>) -> DMatrix<f64> {
         self.by_group.get(&group).map_or_else(|| rows.clone(), |c| c * rows)
     }
 }

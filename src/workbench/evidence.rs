@@ -7,7 +7,9 @@ use crate::diag::Result;
 use crate::diagnose::candidate_effects::Named;
 use crate::diagnose::evidence::Evidence;
 use crate::diagnose::{Diagnosis, Options};
+use crate::fit::Fit;
 use crate::search::Search;
+use crate::search::held_out::Colours;
 use serde::Serialize;
 
 /// What the touches say of one effect that is not in the model.
@@ -29,7 +31,14 @@ pub struct Scored {
     /// Share of the misfit's sum of squares that it takes away.
     pub share: f64,
     pub parameters: Vec<Size>,
+    /// What it would take away from the residual of each touch, µm, to first order: for the small picture beside its name.
+    /// Only of the first ones.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub curve_um: Option<Vec<f64>>,
 }
+
+/// Numbers of all small pictures together.
+const MOST_NUMBERS: usize = 30_000;
 
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Size {
@@ -50,6 +59,10 @@ pub fn scores(state: &Snapshot) -> Vec<Scored> {
     let named = Named::for_fit(fit, &evidence, &opened.machine, &opened.catalogue);
     let search = Search::new(evidence.question(), &named.library);
     let total = evidence.residual.norm_squared().max(f64::MIN_POSITIVE);
+    let pictures = (MOST_NUMBERS / fit.data.observations.len().max(1)).clamp(3, 10);
+    let drawn: std::collections::HashSet<usize> =
+        search.ranking().into_iter().filter(|&i| search.scores[i].visible()).take(pictures).collect();
+    let colours = evidence.colours_um(fit);
     let each = search.scores.iter().enumerate().map(|(i, s)| {
         let columns = &named.columns[i];
         let sizes = columns.iter().zip(s.estimate.iter()).enumerate().map(|(k, (c, estimate))| Size {
@@ -68,11 +81,31 @@ pub fn scores(state: &Snapshot) -> Vec<Scored> {
             passes: s.proposed(),
             share: (s.delta_ss / total).clamp(0.0, 1.0),
             // sets of many blocks say nothing to a reader
+            curve_um: drawn.contains(&i).then(|| taken_away_um(fit, &evidence, &colours, &search, i)),
             parameters: if columns.len() > 12 { Vec::new() } else { sizes.collect() },
         }
     });
     let mut out: Vec<Scored> = each.collect();
     out.sort_by(|a, b| b.visible.cmp(&a.visible).then(a.ln_p.total_cmp(&b.ln_p)).then(a.effect.cmp(&b.effect)));
+    out
+}
+
+/// What candidate `i` takes away from each touch, µm, to first order; 0 where a touch is not used.
+fn taken_away_um(fit: &Fit, evidence: &Evidence, colours: &Colours, search: &Search, i: usize) -> Vec<f64> {
+    // columns are what a size adds to the residual
+    let rows = -evidence.base.project(&(search.columns(i) * &search.scores[i].estimate));
+    let mut of_visit: std::collections::BTreeMap<usize, Vec<usize>> = std::collections::BTreeMap::new();
+    for (row, visit) in evidence.visits.iter().enumerate() {
+        of_visit.entry(*visit).or_default().push(row);
+    }
+    let mut out = vec![0.0; fit.data.observations.len()];
+    for (visit, of) in of_visit {
+        let white = nalgebra::DMatrix::from_fn(of.len(), 1, |k, _| rows[of[k]]);
+        let um = colours.touches(visit, &white);
+        for (k, row) in of.into_iter().enumerate() {
+            out[evidence.used[row]] = (um[(k, 0)] * 1e3).round() / 1e3 + 0.0;
+        }
+    }
     out
 }
 

@@ -52,6 +52,26 @@ async function whereItFails(t) {
   equal(seen.errors, [], "errors in the console");
 }
 
+/** The small curve of a candidate, to first order, is what a fit with it takes away from each touch. */
+async function smallCurves(t) {
+  const { page, seen } = await opened(t, "curves");
+  await told(page);
+  const { small, fitted } = await page.evaluate(async () => {
+    const headers = { "x-axiscal-token": sessionStorage.getItem("axiscal-token"), "content-type": "application/json" };
+    const behind = await (await fetch("/api/evidence", { headers })).json();
+    const first = behind.scores.find((s) => s.effect === "squareness-xy");
+    const tried = await (await fetch("/api/try", { method: "POST", headers, body: JSON.stringify({ version: behind.version, effect: "squareness-xy" }) })).json();
+    return { small: first.curve_um, fitted: tried.curve_um };
+  });
+  equal(small.length, fitted.length, "touches");
+  const top = Math.max(...fitted.map(Math.abs));
+  const off = Math.max(...small.map((v, i) => Math.abs(v - fitted[i])));
+  holds(top > 5 && off < 0.1 * top, `the small curve is ${off.toFixed(3)} µm off, of ${top.toFixed(3)} µm`);
+  const shown = await page.locator("#candidates > li canvas:visible").count();
+  holds(shown === await page.locator("#candidates > li").count(), `${shown} cards have a small curve`);
+  equal(seen.errors, [], "errors in the console");
+}
+
 /** With motion the marks fall within 400 ms, from the old places to the new ones. */
 async function marksFall(t) {
   const { page } = await opened(t, "fall");
@@ -185,6 +205,7 @@ async function sketchForMe(t) {
 export const oneScreenCases = [
   ["workbench_one_screen", oneScreen],
   ["workbench_where_it_fails", whereItFails],
+  ["workbench_small_curves", smallCurves],
   ["workbench_marks_fall", marksFall],
   ["workbench_machine_in_3d", machineIn3d],
   ["workbench_hostile_names", hostileNames],

@@ -1,14 +1,12 @@
 // The candidates, best first: those that these touches cannot separate stand together. Each has its small curve. Below: what is in the model.
 
 import { later, never } from "./later.js";
-import { glance, state, on, setPreview, step, trouble, tryOut } from "./talk.js";
+import { state, on, setPreview, step, trouble, tryOut } from "./talk.js";
 import { DIRECTIONS, curvePoints, follow, membersOf, onAxis, values, variable } from "./plots.js";
 import { byId, chance, colour, element, show, significant, sized, stated, unitOf } from "./words.js";
 
 /** Cards that are shown at once. */
 const FEW = 6;
-/** Candidates that get a small curve: each is a fit, and large studies take their time. */
-const curvesFor = () => (state.inputs.touches.n > 2500 ? 1 : FEW);
 
 let all = false;
 let opened = null;
@@ -209,24 +207,6 @@ function drawCurves() {
   }
 }
 
-/** Fits the first candidates one by one for their curves; ends when the model changes. */
-async function collect() {
-  const { version } = state.live;
-  const first = state.behind.diagnosis?.candidates.slice(0, curvesFor()).map((c) => c.effect) ?? [];
-  for (const id of first) {
-    if (state.live.version !== version) return;
-    if (tried.has(id) || state.live.effects.includes(id)) continue;
-    try {
-      const found = await glance(id);
-      if (!found) return;
-      tried.set(id, found.curve_um);
-      drawCurves();
-    } catch {
-      // what cannot be fitted has no curve; its card says so when it is opened
-    }
-  }
-}
-
 byId("find").addEventListener("input", draw);
 byId("more").addEventListener("click", () => { all = !all; draw(); });
 on("live", (live, newer, first) => {
@@ -239,6 +219,7 @@ on("live", (live, newer, first) => {
   later("effects", draw);
 });
 on("behind", (behind) => {
+  for (const s of behind.scores ?? []) if (s.curve_um && !tried.has(s.effect)) tried.set(s.effect, s.curve_um);
   draw();
   if (!behind.complete) return;
   const best = behind.diagnosis?.candidates[0];
@@ -249,7 +230,6 @@ on("behind", (behind) => {
     draw();
     tryOut({ effect: best.effect }).catch(trouble);
   }
-  collect();
 });
 on("preview", (preview) => {
   const box = byId("previewed");

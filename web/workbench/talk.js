@@ -111,12 +111,6 @@ export async function tryOut(what) {
   return found;
 }
 
-/** The same for a small picture: what is shown over the plot stays. */
-export async function glance(effect) {
-  const found = await ask("/api/try", { version: state.live.version, effect });
-  return found.version === state.live.version ? found : null;
-}
-
 /** A starting formula for what no known effect explains. */
 export const sketched = () => ask("/api/sketch", { version: state.live.version });
 
