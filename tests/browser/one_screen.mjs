@@ -187,6 +187,46 @@ async function tenClicks(t) {
   equal(wrong, [], "not led to the effect");
 }
 
+/** The whole loop without a mouse: look at another axis, add what is proposed, go back, forth again, and write the compensation. */
+async function keyboardOnly(t) {
+  const { folder, page, seen } = await opened(t, "keyboard");
+  await page.waitForSelector("#advice[data-complete=true]", { timeout: 120_000 });
+  /** Tabs to what `selector` finds, in the order of the page. */
+  const to = async (selector) => {
+    await page.evaluate(() => document.activeElement?.blur());
+    for (let k = 0; k < 200; k += 1) {
+      await page.keyboard.press("Tab");
+      if (await page.evaluate((s) => document.activeElement?.matches(s), selector)) return;
+    }
+    throw new Error(`${selector} cannot be reached with the Tab key`);
+  };
+  await to("#multiples [data-variable=time]");
+  await page.keyboard.press("Enter");
+  equal(await page.getAttribute(PLOT, "data-variable"), "time", "the axis");
+  const before = await number(page, "rms");
+  await to("#main-step button");
+  await after(page, () => page.keyboard.press("Enter"));
+  const left = await number(page, "rms");
+  holds(left < 0.5 * before, `${before} → ${left} µm`);
+  await to("#ladder button");
+  await after(page, () => page.keyboard.press("Space"));
+  equal(await number(page, "rms"), before, "back");
+  await after(page, () => page.keyboard.press("Control+z"));
+  equal(await number(page, "rms"), left, "forth");
+  await to("[role=tab][aria-selected=true]");
+  for (const id of ["machine", "touches", "results", "log"]) {
+    await page.keyboard.press("ArrowRight");
+    equal(await page.isVisible(`#${id}`), true, id);
+  }
+  await to("#controller");
+  await page.keyboard.type("linuxcnc");
+  await to("#export");
+  await page.keyboard.press("Enter");
+  await page.waitForSelector("#job[data-state=done]", { timeout: 60_000 });
+  holds(existsSync(join(folder, "study-compensation-linuxcnc/compensation.json")), "no compensation is there");
+  equal(seen.errors, [], "errors in the console");
+}
+
 /** What no known effect explains is sketched by a button: the form is filled, and its curve drawn. */
 async function sketchForMe(t) {
   const { folder, page, seen } = await opened(t, "sketch");
@@ -210,5 +250,6 @@ export const oneScreenCases = [
   ["workbench_machine_in_3d", machineIn3d],
   ["workbench_hostile_names", hostileNames],
   ["workbench_ten_clicks", tenClicks],
+  ["workbench_keyboard_only", keyboardOnly],
   ["workbench_sketch_for_me", sketchForMe],
 ];
