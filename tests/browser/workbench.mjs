@@ -437,10 +437,11 @@ async function timed(t, study, what, limit) {
   await page.waitForSelector("#candidates [data-switch=squareness-xy]", { timeout: 300_000 });
   if (await page.isVisible("#more")) await page.click("#more");
   const click = async (effect) => {
-    await page.evaluate(() => { window.axiscalTimes = null; });
+    await page.evaluate(() => { window.axiscalTimes = null; window.axiscalExpected = undefined; });
     await page.evaluate((id) => document.querySelector(`[data-switch="${id}"]`).click(), effect);
     await page.waitForFunction(() => window.axiscalTimes?.settled, undefined, { timeout: 60_000 });
-    return page.evaluate(() => window.axiscalTimes);
+    // the first picture: what the curve of a candidate leaves, or the fit itself
+    return page.evaluate(() => ({ ...window.axiscalTimes, first: window.axiscalExpected ?? window.axiscalTimes.painted }));
   };
   const [first, again] = [[], []];
   // what no evidence has been worked out for is fitted at the click; what was there before is at hand
@@ -455,7 +456,7 @@ async function timed(t, study, what, limit) {
   const plots = await page.evaluate(() => [...document.querySelectorAll("#residuals .plot")].filter((p) => p.getBoundingClientRect().top < innerHeight).length);
   const lines = [[first, "models not seen before"], [again, "models seen before"]].map(([all, which]) => {
     const sorted = (key) => all.map((a) => a[key]).sort((a, b) => a - b);
-    const each = ["fit", "answered", "painted", "settled"].map((key) => { const s = sorted(key); return `${key} ${s[s.length >> 1].toFixed(0)} (${s[0].toFixed(0)})`; });
+    const each = ["fit", "answered", "first", "painted", "settled"].map((key) => { const s = sorted(key); return `${key} ${s[s.length >> 1].toFixed(0)} (${s[0].toFixed(0)})`; });
     return `${what}, ${which}: ${touches} touches, ${plots} plots in sight, ms from the click, median (best) of ${all.length}: ${each.join(", ")}`;
   });
   for (const line of lines) console.log(`  ${line}`);
@@ -463,7 +464,7 @@ async function timed(t, study, what, limit) {
   await page.screenshot({ path: join(t.out, `times-${what}.png`) });
   holds(first.length >= 1 && again.length >= 5, `${first.length} models were fitted, ${again.length} were at hand`);
   for (const [all, which] of [[first, "not seen before"], [again, "seen before"]]) {
-    const best = Math.min(...all.map((a) => a.painted));
+    const best = Math.min(...all.map((a) => a.first));
     holds(best < limit, `the best click on a model ${which} took ${best.toFixed(0)} ms, the limit is ${limit} ms`);
   }
   equal(seen.errors, [], "errors in the console");
@@ -478,7 +479,7 @@ async function times(t) {
 }
 
 async function timesOfMany(t) {
-  await timed(t, many(t.dir), "many", 500);
+  await timed(t, many(t.dir), "many", 250);
 }
 
 async function withoutToken(t) {

@@ -2,7 +2,7 @@
 
 import { later, never } from "./later.js";
 import { state, on, setPreview, step, trouble, tryOut } from "./talk.js";
-import { DIRECTIONS, curvePoints, follow, membersOf, onAxis, values, variable } from "./plots.js";
+import { DIRECTIONS, curvePoints, expect, expectNothing, follow, membersOf, onAxis, values, variable } from "./plots.js";
 import { byId, chance, colour, element, show, significant, sized, stated, unitOf } from "./words.js";
 
 /** Cards that are shown at once. */
@@ -21,13 +21,25 @@ function toggle(effect, isOn, disabled) {
     click: async (e) => {
       const id = e.currentTarget.dataset.switch;
       const byKey = e.detail === 0;
-      await step({ switch: { effect: id, on: !isOn } });
+      await switchEffect(id, !isOn);
       // the row has moved to the other list: the keyboard goes along
       draw();
       if (byKey && !isOn) byId("model").open = true;
       document.querySelector(`[data-switch="${CSS.escape(id)}"]`)?.focus();
     },
   }, isOn ? "Remove" : "Add");
+}
+
+/** Puts an effect into the model, or takes it out; its known curve is what the marks show until it is fitted. */
+export async function switchEffect(id, isOn) {
+  const curve = isOn ? tried.get(id) : null;
+  const began = performance.now();
+  const made = step({ switch: { effect: id, on: isOn } }, () => {
+    if (!curve) return;
+    expect(curve);
+    requestAnimationFrame(() => { window.axiscalExpected = performance.now() - began; });
+  });
+  if (!await made && curve) expectNothing();
 }
 
 /** What the diagnosis says of an effect. */

@@ -1,6 +1,7 @@
 // What to do next, as the program decided it, with a button where the page can do it itself.
 
-import { state, on, call, step, trouble } from "./talk.js";
+import { state, on, call, trouble } from "./talk.js";
+import { switchEffect } from "./effects.js";
 import { openFormula, sketch } from "./formula.js";
 import { byId, element } from "./words.js";
 
@@ -8,7 +9,7 @@ import { byId, element } from "./words.js";
 const FIRST = 3;
 
 const BUTTONS = {
-  add: (act) => [`Add ${state.inputs.effects.find((e) => e.id === act.effect)?.name ?? act.effect}`, () => step({ switch: { effect: act.effect, on: true } })],
+  add: (act) => [`Add ${state.inputs.effects.find((e) => e.id === act.effect)?.name ?? act.effect}`, () => switchEffect(act.effect, true)],
   "measure-more": () => ["Write this program", () => byId("plan-next").click()],
   export: () => ["Export the compensation", () => byId("export").click()],
   sketch: () => ["Sketch it for me", sketch],

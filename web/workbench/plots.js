@@ -31,6 +31,8 @@ let proposed = null;
 let shownDirections = new Set([0, 1, 2]);
 /** Residuals of the model before this one. */
 let ghosts = null;
+/** Residuals that the marks show, which may still be on their way. */
+let shownAt = null;
 /** By touch: direction in R and its sign. */
 export let sides = [];
 let members = [[], [], []];
@@ -253,6 +255,8 @@ const bandOf = () => 2 * state.live.noise_um;
 function draw() {
   const { live } = state;
   stale = false;
+  falling += 1;
+  shownAt = live.residual_um;
   never("plot");
   const { marks, lines } = traces();
   const layout = layoutOf({
@@ -292,23 +296,47 @@ new ResizeObserver(() => { if (made && seen()) Plotly.Plots.resize(plot); }).obs
 
 const still = matchMedia("(prefers-reduced-motion: reduce)");
 let falling = 0;
+/** When the marks will have come to rest. */
+let restAt = 0;
 
-/** The marks fall from the old residuals to the new ones on a canvas; then the library draws the same. */
-function fall(from) {
+/** The marks fall from where they are to new residuals on a canvas; then the library draws the same. */
+function fall(to) {
   const mine = ++falling;
-  const to = state.live.residual_um;
+  const from = shownAt;
   const began = performance.now();
+  // marks that are on their way already arrive when they would have
+  const time = restAt > began ? Math.max(60, restAt - began) : FALL;
+  restAt = began + time;
   const turn = () => {
     if (mine !== falling) return;
-    const t = still.matches || !from ? 1 : Math.min(1, (performance.now() - began) / FALL);
+    const t = still.matches || !from ? 1 : Math.min(1, (performance.now() - began) / time);
     const eased = 1 - (1 - t) ** 3;
     const at = t === 1 ? to : to.map((r, i) => from[i] + (r - from[i]) * eased);
+    shownAt = at;
     if (!frame(plot, cell, traces(at).marks, bandOf())) return draw();
     plot.dataset.framed = state.live.version;
     if (t < 1) requestAnimationFrame(turn);
-    else later("plot", () => { if (stale && mine === falling) draw(); });
+    else if (to === state.live.residual_um) later("plot", () => { if (stale && mine === falling) draw(); });
   };
   turn();
+}
+
+/**
+ * Shows at once what a candidate would leave, by its curve, while the fit is under way; the fit's own residuals follow.
+ * `taken` is µm by touch.
+ */
+export function expect(taken) {
+  if (!made || !seen() || !state.live) return;
+  ghosts = state.live.residual_um;
+  stale = true;
+  fall(state.live.residual_um.map((r, i) => r - taken[i]));
+}
+
+/** What was expected did not come: the marks go back. */
+export function expectNothing() {
+  ghosts = null;
+  stale = true;
+  drawIfSeen();
 }
 
 export function rescale() {
@@ -364,7 +392,7 @@ on("live", (live, newer) => {
   stale = true;
   hover(null);
   if (!seen()) return;
-  if (made && comparable) fall(comparable);
+  if (made && comparable) fall(live.residual_um);
   else draw();
 });
 on("preview", () => {

@@ -77,14 +77,16 @@ export function trouble(error) {
 
 let busy = false;
 
-/** Makes a step: one at a time, each asked of the state that is shown. */
-export async function step(what) {
+/** Makes a step: one at a time, each asked of the state that is shown. `meanwhile` is called once it is asked for. */
+export async function step(what, meanwhile = null) {
   if (busy || !state.live) return false;
   busy = true;
   const began = performance.now();
   try {
     tell("trouble", null);
-    const live = await ask("/api/step", { version: state.live.version, ask: what });
+    const asked = ask("/api/step", { version: state.live.version, ask: what });
+    meanwhile?.();
+    const live = await asked;
     const answered = performance.now();
     await put(live);
     const drawn = performance.now();
