@@ -173,7 +173,7 @@ globalThis.axiscalPlots = (() => {
     const lay = layout(el, {
       showlegend: true, legend: { orientation: 'h', y: 1.02, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 30, t: 44, b: 44 },
       xaxis: { tickvals: x, ticktext: names, range: [-0.35, x.length - 0.45], zeroline: false, title: { text: 'model, step by step' } },
-      yaxis: { title: { text: 'remaining error (RMS), µm' }, ...(wide ? { type: 'log', tickvals: [-3, -2, -1, 0, 1, 2, 3].flatMap((k) => [1, 2, 5].map((f) => Number((f * 10 ** k).toPrecision(3)))), range: [Math.log10(0.6 * Math.min(...all)), Math.log10(1.8 * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
+      yaxis: { title: { text: narrow(el, 450) ? 'RMS, µm' : 'remaining error (RMS), µm' }, ...(wide ? { type: 'log', tickvals: [-3, -2, -1, 0, 1, 2, 3].flatMap((k) => [1, 2, 5].map((f) => Number((f * 10 ** k).toPrecision(3)))), range: [Math.log10(0.6 * Math.min(...all)), Math.log10(1.8 * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
       shapes: [{ type: 'line', x0: 0, x1: 1, xref: 'paper', y0: noise, y1: noise, line: { color: c.ink, width: 2, dash: 'dash' } }],
       annotations: [{ x: 0, xref: 'paper', xanchor: 'left', xshift: 4, y: wide ? Math.log10(noise) : noise, yanchor: 'bottom', bgcolor: c.paper, borderpad: 1, yshift: 2, showarrow: false, text: `probe noise ${digits(noise)} µm` }],
     });
@@ -240,9 +240,11 @@ globalThis.axiscalPlots = (() => {
       traces.push({ type: 'scatter', mode: 'markers', x: marked.map((i) => x[i]), y: marked.map((i) => factor(i) * t.residual_um[to][i]), marker: { symbol: 'circle-open', size: 15, color: c.ink, line: { width: 3 } }, hoverinfo: 'skip' });
     }
     const noise = 2 * view.errors.noise_um;
+    const small = narrow(el, 260);
     const lay = layout(el, {
-      xaxis: { title: { text: safe(variable.title), ...(narrow(el, 360) ? { font: { size: 10 } } : {}) }, zeroline: false },
-      yaxis: { title: { text: alongNormal ? 'residual along the normal, µm' : 'residual, µm' }, zeroline: true },
+      ...(small ? { margin: { l: 4, r: 6, t: 4, b: alongNormal ? 46 : 34 } } : {}),
+      xaxis: { title: { text: small ? safe(variable.title).replace(' about ', '<br>about ') : safe(variable.title), ...(narrow(el, 360) ? { font: { size: 10 } } : {}) }, zeroline: false, ...(small ? { nticks: 5, tickangle: 0, tickfont: { size: 9 } } : {}) },
+      yaxis: { title: { text: alongNormal && !small ? 'residual along the normal, µm' : 'residual, µm', ...(small ? { font: { size: 10 } } : {}) }, zeroline: true, ...(small ? { nticks: 5, tickfont: { size: 9 } } : {}) },
       shapes: [{ type: 'rect', x0: 0, x1: 1, xref: 'paper', y0: -noise, y1: noise, fillcolor: c.band, line: { width: 0 }, layer: 'below' }],
       hovermode: 'closest',
     });
@@ -478,20 +480,25 @@ globalThis.axiscalPlots = (() => {
   function candidates(el, view) {
     const c = colours(el);
     const list = view.diagnosis.candidates;
-    const y = list.map((k) => safe(k.name).slice(0, 44));
+    const small = narrow(el, 450);
+    const cut = (name, most) => (name.length > most ? `${name.slice(0, most - 1)}…` : name);
+    // two names that are cut alike are two rows all the same
+    const y = list.map((k, i) => `${safe(cut(k.name, small ? 26 : 44))}${list.slice(0, i).some((o) => cut(o.name, small ? 26 : 44) === cut(k.name, small ? 26 : 44)) ? ` (${i + 1})` : ''}`);
     const traces = [
       { type: 'scatter', mode: 'markers', x: list.map((k) => k.rms_after_um), y, marker: { size: 12, symbol: list.map((k) => standing(view.diagnosis, k).symbol), color: OKABE.blue, line: { width: 2, color: OKABE.blue } }, name: 'remaining error', hovertemplate: '%{x:.2f} µm<extra>remaining</extra>' },
       { type: 'scatter', mode: 'markers', x: list.map((k) => (tried(k) ? k.held_out_after_um : null)), y, marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'cross-validated', hovertemplate: '%{x:.2f} µm<extra>cross-validated</extra>' },
     ];
     const top = Math.max(view.diagnosis.rms_um, ...list.flatMap((k) => [k.rms_after_um, k.held_out_after_um ?? 0]));
+    const above = view.diagnosis.rms_um >= view.errors.noise_um;
     const line = (x, dash) => ({ type: 'line', x0: x, x1: x, y0: 0, y1: 1, yref: 'paper', line: { color: c.ink, width: 2, dash } });
     const lay = layout(el, {
-      showlegend: true, legend: { orientation: 'h', y: 1.12, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 16, t: 50, b: 44 },
-      xaxis: { title: { text: 'remaining error (RMS), µm' }, range: [0, 1.12 * top] }, yaxis: { autorange: 'reversed', ticks: '' },
+      showlegend: true, legend: { orientation: 'h', y: small ? -0.42 : 1.12, yanchor: small ? 'top' : 'bottom', x: 0, ...(small ? { font: { size: 10 } } : {}) }, margin: { l: 8, r: 16, t: small ? 22 : 50, b: small ? 76 : 44 },
+      xaxis: { title: { text: small ? 'RMS, µm' : 'remaining error (RMS), µm' }, range: [0, 1.12 * top], ...(small ? { nticks: 5 } : {}) }, yaxis: { autorange: 'reversed', ticks: '', ...(small ? { tickfont: { size: 10 } } : {}) },
       shapes: [line(view.diagnosis.rms_um, 'solid'), line(view.errors.noise_um, 'dash')],
       annotations: [
-        { x: view.diagnosis.rms_um, y: 1, yref: 'paper', yanchor: 'bottom', xanchor: 'right', showarrow: false, text: 'model now' },
-        { x: view.errors.noise_um, y: 1, yref: 'paper', yanchor: 'bottom', showarrow: false, text: 'noise' },
+        // each on the side away from the other
+        { x: view.diagnosis.rms_um, y: 1, yref: 'paper', yanchor: 'bottom', xanchor: above ? 'left' : 'right', showarrow: false, text: 'model now' },
+        { x: view.errors.noise_um, y: 1, yref: 'paper', yanchor: 'bottom', xanchor: above ? 'right' : 'left', showarrow: false, text: 'noise' },
       ],
     });
     return draw(el, traces, lay, `Remaining error with each candidate: ${list.map((k) => `${k.name} ${digits(k.rms_after_um)} µm`).join(', ')}.`);

@@ -19,12 +19,17 @@
     return el;
   }
 
-  const more = id('more');
-  function section(name, title, says, page = false) {
-    const s = make(page ? 'section.page' : 'section', { 'aria-labelledby': `${name}-title` }, make('h2', { id: `${name}-title` }, title));
-    if (says) s.append(make('p', {}, says));
-    more.append(s);
+  function section(name, title, says, into = id('more')) {
+    const s = make('section', { 'aria-labelledby': `${name}-title` }, make('h2', { id: `${name}-title` }, title));
+    if (says) s.append(make('p.keep', {}, says));
+    into.append(s);
     return s;
+  }
+  /** Sections beside each other, where there is room. */
+  function pair() {
+    const p = make('div.pair');
+    id('more').append(p);
+    return p;
   }
 
   // plots are drawn when they come near, so that the first screen stands at once; the printer gets them all
@@ -70,6 +75,7 @@
   // paper is white
   let before = null;
   addEventListener('beforeprint', () => {
+    if (before !== null) return;
     before = document.documentElement.dataset.theme ?? '';
     document.documentElement.dataset.theme = 'light';
     document.documentElement.classList.add('printing');
@@ -77,21 +83,83 @@
     state.flat = true;
     [...waiting.keys()].forEach(drawNow);
     redraw.forEach((job) => job());
+    touchRows(rowsThatFill());
   });
   addEventListener('afterprint', () => {
+    touchRows(null);
+    forgetSheets();
     if (before) document.documentElement.dataset.theme = before;
     else delete document.documentElement.dataset.theme;
     document.documentElement.classList.remove('printing');
     for (const el of document.querySelectorAll('details[data-opened]')) { el.open = false; delete el.dataset.opened; }
+    before = null;
     state.flat = false;
     redraw.forEach((job) => job());
   });
+  // a turned telephone, another size of the window
+  let resized = 0;
+  addEventListener('resize', () => {
+    clearTimeout(resized);
+    resized = setTimeout(() => { if (before === null) redraw.forEach((job) => job()); }, 100);
+  });
+
+  /** The rows of the table of touches: a page of them, or as many as the paper has room for. Set where the table is made. */
+  let touchRows = () => {};
+  const PAGE_MM = 273, MOST_PAGES = 4;
+
+  /** Elements before which a new sheet begins. */
+  let begin = [];
+  function forgetSheets() {
+    for (const el of begin) el.style.breakBefore = '';
+    begin = [];
+  }
+
+  /**
+   * Divides the page into sheets, each piece whole and with its heading, and says how many touches fill the last sheet: the
+   * rest of the sheet where the table begins, or, where little of it is left and sheets remain, most of the next one, too.
+   */
+  function rowsThatFill() {
+    const FIRST = 4;
+    touchRows(FIRST);
+    forgetSheets();
+    const px = id('main').getBoundingClientRect().width / 186; // the paper is 186 mm wide
+    const sheet = PAGE_MM * px;
+    const top = document.body.getBoundingClientRect().top;
+    const seen = (el) => el.getClientRects().length > 0;
+    const whole = '.pair, figure, .card, .verdict';
+    // in the order in which it is printed
+    const pieces = [...document.querySelectorAll(`${whole}, p, li, tr`)].filter((el) => seen(el) && !el.parentElement.closest(`${whole}, li, footer`)).map((el) => {
+      let head = el.parentElement.matches('.grid') && !el.previousElementSibling ? el.parentElement : el;
+      for (let up = head.previousElementSibling; up && (!seen(up) || up.matches('h2, h3, .keep')); up = up.previousElementSibling) if (seen(up)) head = up;
+      return { el, head, from: head.getBoundingClientRect().top - top, to: el.getBoundingClientRect().bottom - top };
+    }).sort((x, y) => x.from - y.from);
+    let [shift, sheets, row] = [0, 1, 12];
+    for (const { el, head, from, to } of pieces) {
+      if (el.closest('#touches-table tbody')) row = to - from;
+      if (to + shift <= (sheets - 0.01) * sheet) continue;
+      if (from + shift < sheets * sheet && to - from < sheet) {
+        shift += sheets * sheet - (from + shift);
+        if (el.matches(whole) || head !== el) {
+          head.style.breakBefore = 'page';
+          begin.push(head);
+        }
+      }
+      sheets += 1;
+    }
+    const last = id('foot').getBoundingClientRect().bottom - top + shift;
+    // a little is kept back: a line breaks earlier on paper now and then
+    const rest = (sheets - 0.04) * sheet - last;
+    const rows = (room) => FIRST + Math.floor(room / row);
+    const next = rows(rest) < 0 || (rest < 0.25 * sheet && sheets < MOST_PAGES);
+    return Math.max(0, rows(next ? rest + 0.75 * sheet : rest));
+  }
 
   // ---------------------------------------------------------------- the first screen
   const proposed = view.proposed.length > 0;
   plot(id('errors'), () => P.errors(id('errors'), view), true);
   id('errors-says').textContent = `RMS of ${e.used} touches${view.ladder.some((r) => r.held_out_rms_um !== null) ? '; diamond: cross-validated, each index position left out of the fit in turn' : ''}. No model can fall below about the probe noise.`;
   plot(id('parameters'), () => P.parameters(id('parameters'), view), true);
+  for (const line of view.headline.why) id('why').append(make('li', {}, line));
   const t = view.tolerance;
   const limit = `Shaded: tolerance ${t.error_um} µm at ${t.radius_mm} mm${t.stated ? '' : ' (default; set [tolerance] in the study)'}.`;
   id('parameters-says').append(
@@ -99,8 +167,16 @@
       : view.diagnosis.verdict !== 'adequate' && view.parameters.some((p) => p.status !== 'undetermined') ? make('span.warn', {}, `These values ${view.diagnosis.faint || view.diagnosis.verdict === 'too-little-data' ? 'may include' : 'include'} part of the missing error. `) : '',
     `Circle: within, diamond: too large, square: uncertain. ${limit}`,
   );
-  const copy = (text) => make('button.noprint', { type: 'button', 'aria-label': `copy the command ${text}`, onclick: (ev) => {
-    navigator.clipboard?.writeText(text).then(() => { ev.target.textContent = 'copied'; }, () => {});
+  const copy = (text) => make('button.noprint', { type: 'button', 'aria-label': `copy the command ${text}`, onclick: async (ev) => {
+    const code = ev.target.previousElementSibling;
+    try {
+      await navigator.clipboard.writeText(text);
+    } catch {
+      // a browser that gives no clipboard to a file: the selection, and its own copying
+      getSelection().selectAllChildren(code);
+      if (!document.execCommand('copy')) return;
+    }
+    ev.target.textContent = 'copied';
   } }, 'copy');
   for (const n of view.next) {
     id('next').append(make('li', {}, make('strong', {}, n.what), make('span.how', {}, n.how), n.command ? make('div.command', {}, make('code', {}, n.command), copy(n.command)) : null));
@@ -108,28 +184,31 @@
 
   // ---------------------------------------------------------------- results
   {
-    const s = section('results', 'The results', proposed ? 'With the missing error in the model. The last column shows the values without it: do not use them.' : '', true);
+    const s = section('results', 'The results', proposed ? 'With the missing error in the model. The last column shows the values without it: do not use them.' : '');
     const list = proposed ? view.proposed : view.parameters;
-    const head = ['', 'symbol', 'what it is', 'value', 'std. unc.', '95 %', 'unit', `at ${t.radius_mm} mm, µm`, 'tolerance', ...(proposed ? ['without it'] : [])];
+    // what is wide is left away on a telephone: name, value and verdict stay
+    const columns = [['error'], ['value ± 95 %', 'n'], ['verdict'], [`at ${t.radius_mm} mm, µm`, 'n', 1], ['tolerance', 'n', 1], ['std. unc.', 'n', 1], ...(proposed ? [['without it', 'n', 1]] : [])];
+    const cell = (tag, k, attributes, ...inside) => make([tag, columns[k][1], columns[k][2] ? 'wide' : null].filter(Boolean).join('.'), attributes, ...inside);
     const body = list.map((p) => {
-      const j = P.JUDGEMENTS[p.judgement];
       const old = view.parameters.find((q) => q.name === p.name);
       const untold = p.status === 'undetermined';
-      const word = untold ? 'not determined' : p.status === 'fixed' ? 'held' : j.word;
+      const word = untold ? 'not determined' : p.status === 'fixed' ? 'held' : P.JUDGEMENTS[p.judgement].word;
       const kind = { within: 'good', beyond: 'act', open: 'unknown' }[p.judgement] ?? '';
-      return make('tr', {}, make('td', {}, make(`span.badge${kind ? `.${kind}` : ''}`, {}, word)),
-        make('th', { scope: 'row' }, p.name + (p.alias ? ` (${p.alias})` : '')), make('td', {}, p.says),
-        make('td.n', {}, untold ? '?' : valued(p.value, p.sigma)), make('td.n', {}, digits(p.sigma, 2)), make('td.n', {}, p.expanded === null ? '–' : `± ${digits(p.expanded, 2)}`),
-        make('td', {}, p.unit), make('td.n', {}, untold ? '?' : digits(p.at_radius_um)), make('td.n', {}, p.tolerance === null ? '–' : digits(p.tolerance)),
-        proposed ? make('td.n.muted', {}, old ? valued(old.value, old.sigma) : '–') : null);
+      const cells = [
+        untold ? '?' : `${valued(p.value, p.sigma)}${p.expanded === null ? '' : ` ± ${digits(p.expanded, 2)}`} ${p.unit}`,
+        make(`span.badge${kind ? `.${kind}` : ''}`, {}, word), untold ? '?' : digits(p.at_radius_um), p.tolerance === null ? '–' : `${digits(p.tolerance)} ${p.unit}`, digits(p.sigma, 2),
+        ...(proposed ? [old ? valued(old.value, old.sigma) : '–'] : []),
+      ];
+      return make('tr', {}, cell('th', 0, { scope: 'row' }, p.name + (p.alias ? ` (${p.alias})` : ''), make('span.says', {}, p.says)), ...cells.map((v, k) => cell('td', k + 1, {}, v)));
     });
-    s.append(make('div.scroll', { tabindex: 0, role: 'region', 'aria-label': 'table of the results' }, make('table', {}, make('thead', {}, make('tr', {}, ...head.map((h, k) => make(k >= 3 && k !== 6 ? 'th.n' : 'th', { scope: 'col' }, h || 'verdict')))), make('tbody', {}, ...body))));
+    s.append(make('table', { id: 'results-table' }, make('thead', {}, make('tr', {}, ...columns.map(([title], k) => cell('th', k, { scope: 'col' }, title)))), make('tbody', {}, ...body)));
     s.append(make('p.muted', {}, `${e.noise_says}. ${e.used} of ${e.touches} touches used, ${e.unknowns} unknowns. Model: ${view.study.effects.join(', ')}.`));
     for (const w of new Set(view.warnings)) s.append(make('p.warn', {}, w));
   }
 
   // ---------------------------------------------------------------- candidates
   const d = view.diagnosis;
+  const PRINTED_CARDS = 3;
   if (d.candidates.length || d.where.length) {
     const s = section('candidates', d.verdict === 'adequate' ? 'What was looked for' : 'What may be missing', d.verdict === 'adequate'
       ? `${d.tested} known effects were tested on the residual, and none is found. These would be the next best; they do not pass.`
@@ -137,9 +216,7 @@
     if (d.where.length && !view.headline.detail.includes(d.where[0].says)) s.append(make('p', {}, d.where[0].says));
     if (d.where.length > 1) s.append(make('details', {}, make('summary', {}, 'what else it depends on (one error may show in several ways)'), make('ul.plain', {}, ...d.where.slice(1).map((w) => make('li', {}, w.says)))));
     if (d.candidates.length) {
-      const [f, div] = figure('candidates-plot', 'Filled circle: proposed. Hollow circle: explains part. Cross: explains no more than noise could. Diamond: cross-validated error.');
-      plot(div, () => P.candidates(div, view));
-      const cards = make('div.grid');
+      const cards = make('div.grid.cards');
       const alike = (c) => [...c.same_as.map((a) => (d.effects[a] ? `${d.effects[a].name} (${a})` : a)), ...(c.or_else ? [c.or_else] : [])];
       d.candidates.forEach((c, k) => {
         const stands = P.standing(d, c);
@@ -149,7 +226,7 @@
         const mends = d.effects[c.effect]?.mends;
         cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(stands.proposed ? 'span.badge.act' : 'span.badge', {}, stands.word)),
           make('dl.facts', {}, ...fact('id', c.effect), ...fact('remaining error', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
-            ...fact('cross-validated error', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the difference is sure to ± ${digits(c.held_out_se_um, 2)} µm` : ''}), of those that both models can predict${c.nested ? ', the choice made anew each time' : ''}` : 'cannot be tried with these poses'),
+            ...fact('cross-validated error', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the difference is known to ± ${digits(c.held_out_se_um, 2)} µm` : ''})` : 'cannot be tried with these poses'),
             ...fact('probability by noise alone', `${p} (${least}, all ${d.tested} effects counted in)`),
             ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${q.unit}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),
             ...(alike(c).length ? fact('cannot be separated from', alike(c).join('; ')) : []),
@@ -157,17 +234,25 @@
             ...(c.weakens?.length ? fact('makes less certain', c.weakens.map((w) => w.name).join(', ')) : [])),
           make('p', {}, c.says), c.look ? make('p', {}, make('strong', {}, 'Check at the machine: '), c.look) : null, mends ? make('p', {}, make('strong', {}, 'How to correct it: '), mends) : null));
       });
-      s.append(f, cards);
+      s.append(cards);
+      if (d.candidates.length > PRINTED_CARDS) s.append(make('p.onlyprint.muted', {}, `The cards of ${d.candidates.length - PRINTED_CARDS} more candidates are in the page on the screen.`));
     }
     for (const g of d.gross ?? []) s.append(make('p.warn', {}, `${g.says}: the error would be ${digits(g.rms_um)} µm`));
   }
 
   // ---------------------------------------------------------------- the ladder
   {
-    const s = section('ladder', 'Step by step to the noise', 'Remaining error of each model: lower is better, down to the noise. If the fitted error falls and the cross-validated error does not, the model fits noise.');
+    const beside = pair();
+    const s = section('ladder', 'Step by step to the noise', 'Remaining error of each model: lower is better, down to the noise. If the fitted error falls and the cross-validated error does not, the model fits noise.', beside);
     const [f, div] = figure('ladder-plot', [d.candidates.length ? 'Each index position is left out in turn. The cards of the candidates count only touches that the model without the candidate can predict too, so their figures differ.' : '', ...view.ladder_notes].filter(Boolean).join(' '));
     plot(div, () => P.ladder(div, view));
     s.append(f);
+    if (d.candidates.length) {
+      const c = section('candidates-compared', 'The candidates compared', '', beside);
+      const [g, at] = figure('candidates-plot', 'Filled circle: proposed. Hollow circle: explains part. Cross: explains no more than noise could. Diamond: cross-validated error.');
+      plot(at, () => P.candidates(at, view));
+      c.append(g);
+    }
   }
 
   // ---------------------------------------------------------------- residuals
@@ -190,13 +275,13 @@
       });
       return b;
     });
-    const chosen = make('p.onlyprint.muted', {});
+    const chosen = make('p.onlyprint.muted.keep', {});
     const words = () => { chosen.textContent = `before: ${view.ladder[state.from].label}; after: ${view.ladder[state.to].label}`; };
     words();
     const change = (key) => (v) => { state[key] = v; words(); again(); };
-    s.append(make('div.controls', {}, make('span.noprint', {}, 'before: '), select('model shown as before', state.from, change('from')),
-      make('span.noprint', {}, 'after: '), select('model shown as after', state.to, change('to')), ...toggles), chosen);
-    const grid = make('div.grid');
+    s.append(make('div.controls.noprint', {}, make('span', {}, 'before: '), select('model shown as before', state.from, change('from')),
+      make('span', {}, 'after: '), select('model shown as after', state.to, change('to')), ...toggles), chosen);
+    const grid = make('div.grid.small');
     for (const v of [...view.variables].sort((a, b) => (b.share ?? -1) - (a.share ?? -1))) {
       const share = v.share !== null && d.verdict !== 'adequate' && v.share >= 0.05 ? `${Math.round(100 * v.share)} % of what the model does not explain depends on this` : '';
       const [f, div] = figure(`residual-${v.id}`, share);
@@ -205,13 +290,14 @@
       plot(div, job);
       grid.append(f);
     }
-    // before the plots: on paper it would stand alone on a page behind them
-    s.append(make('p', {}, view.comparison_says), grid);
+    // before the plots: on paper it would be alone on a page behind them
+    s.append(make('p.keep', {}, view.comparison_says), grid);
   }
 
   // ---------------------------------------------------------------- the machine
+  const machineAndDoubt = pair();
   {
-    const s = section('machine', 'Where on the machine', 'All axes at zero. An arrow at each touch shows its residual.');
+    const s = section('machine', 'Where on the machine', 'All axes at zero. An arrow at each touch shows its residual.', machineAndDoubt);
     const [f, div] = figure('machine-plot', '', true);
     const scale = make('figcaption', {});
     const job = () => P.machine(div, view, state).then((parts) => {
@@ -224,7 +310,7 @@
 
   // ---------------------------------------------------------------- what is not told
   {
-    const s = section('doubt', 'What cannot be determined', '');
+    const s = section('doubt', 'What cannot be determined', '', machineAndDoubt);
     const list = make('ul.plain');
     const effectName = (n) => d.effects[n]?.name ?? n;
     // what is said of several alike is said once
@@ -245,7 +331,6 @@
     if (view.correlation.names.length > 1) {
       const [f, div] = figure('correlation-plot', proposed ? 'Correlation of the results of the present model: near 0 they are independent; near 1 or −1 only their difference or sum is well known.' : 'Correlation of the results: near 0 they are independent; near 1 or −1 only their difference or sum is well known.');
       div.style.height = `${Math.min(640, 160 + 34 * view.correlation.names.length)}px`;
-      f.style.maxWidth = '760px';
       plot(div, () => P.correlation(div, view));
       s.append(f);
     }
@@ -276,16 +361,16 @@
 
   // ---------------------------------------------------------------- every touch
   {
-    const s = section('touches', 'Every touch', '', true);
+    const s = section('touches', 'Every touch', '');
     const q = view.touches;
     const letters = Object.keys(q.axes).sort((a, b) => 'XYZABC'.indexOf(a) - 'XYZABC'.indexOf(b));
     const rows = q.id.map((_, i) => i).map((i) => ({ i, run: q.run[i], id: q.id[i], stage: q.words[q.stage[i]], block: q.words[q.block[i]], face: q.words[q.face[i]], ...Object.fromEntries(letters.map((l) => [l, q.axes[l][i]])), time: q.time_h[i],
       before: q.residual_um[e.before][i], after: q.residual_um[e.after][i], std: q.standardised[i], why: q.rejected[i] ?? '', source: P.source(view, i) }));
     for (const u of view.unusable) rows.push({ i: -1, run: u.run, id: u.id, stage: '', block: '', face: '', time: null, before: null, after: null, std: null, why: u.reason, source: `${view.study.runs[u.run - 1]?.log ?? 'log'}:${u.line}` });
-    // of the study's own model, whose miss stands beside it
-    const unusual = ['std', 'how unusual', 1, `The residual ${proposed ? 'before' : 'after'}, over the standard deviation that the other touches let expect (studentised): beyond 4 chance alone seldom makes it`];
+    // of the study's own model, whose residual is in the column before
+    const unusual = ['std', 'how unusual', 1, `The residual ${proposed ? 'before' : 'after'}, divided by the standard deviation that the other touches predict (studentised): noise alone seldom exceeds 4`];
     const columns = [['run', 'run', 1], ['id', 'touch', 1], ['stage', 'stage'], ['block', 'block'], ['face', 'face'], ...letters.map((l) => [l, `${l}, ${'ABC'.includes(l) ? 'deg' : 'mm'}`, 1]), ['time', 'time, h', 1], ['before', 'before, µm', 1], ...(proposed ? [unusual] : []), ['after', 'after, µm', 1], ...(proposed ? [] : [unusual]), ['why', 'not used because'], ['source', 'source line']];
-    const SIZE = 50;
+    let size = 50;
     const sort = { by: 'after', down: true };
     let filter = '';
     let page = 0;
@@ -313,7 +398,7 @@
     function show() {
       const words = filter.toLowerCase().split(/\s+/).filter(Boolean);
       const kept = rows.filter((r) => words.every((w) => columns.some(([key]) => text(key, r[key]).toLowerCase().includes(w))));
-      // misses are sorted by size, whichever way they go
+      // residuals are sorted by size, whatever their sign
       const key = (r) => (['before', 'after', 'std'].includes(sort.by) && r[sort.by] !== null ? Math.abs(r[sort.by]) : r[sort.by]);
       kept.sort((a, b) => {
         const [x, y] = [key(a), key(b)];
@@ -322,11 +407,11 @@
         if (y === null || y === undefined) return -1;
         return (x < y ? -1 : 1) * (sort.down ? -1 : 1);
       });
-      const pages = Math.max(1, Math.ceil(kept.length / SIZE));
+      const pages = Math.max(1, Math.ceil(kept.length / size));
       page = Math.min(Math.max(0, page), pages - 1);
-      body.replaceChildren(...kept.slice(page * SIZE, (page + 1) * SIZE).map((r) => make(r.why ? 'tr.off' : 'tr', {}, ...columns.map(([k, , number]) => make(number ? 'td.n' : 'td', {}, text(k, r[k]))))));
+      body.replaceChildren(...kept.slice(page * size, (page + 1) * size).map((r) => make(r.why ? 'tr.off' : 'tr', {}, ...columns.map(([k, , number]) => make(number ? 'td.n' : 'td', {}, text(k, r[k]))))));
       const ways = ['before', 'after', 'std'].includes(sort.by) && sort.down;
-      printed.textContent = kept.length > SIZE ? `${ways && page === 0 ? `The ${SIZE} largest` : `${Math.min(SIZE, kept.length - page * SIZE)}`} of ${rows.length} touches; all of them are in the page on the screen.` : '';
+      printed.textContent = kept.length > size ? `${ways && page === 0 ? `The ${size} largest` : `${Math.min(size, kept.length - page * size)}`} of ${rows.length} touches; all of them are in the page on the screen.` : '';
       count.textContent = `${kept.length} of ${rows.length} touches, page ${page + 1} of ${pages}`;
       previous.disabled = page === 0;
       next.disabled = page === pages - 1;
@@ -338,9 +423,10 @@
     }
     const input = make('input', { type: 'search', id: 'filter', placeholder: 'block, face, line …' });
     input.addEventListener('input', () => { filter = input.value; page = 0; show(); });
-    s.append(make('p.muted', {}, `Before: ${view.ladder[e.before].label}; after: ${view.ladder[e.after].label}. Largest residuals first; the source line is the touch's place in the log. How unusual: the miss ${proposed ? 'before' : 'after'} over what the other touches let expect; beyond 4 chance alone seldom makes it.`), printed,
+    s.append(make('p.muted', {}, `Before: ${view.ladder[e.before].label}; after: ${view.ladder[e.after].label}. Largest residuals first; the source line is the touch's place in the log. How unusual: the residual ${proposed ? 'before' : 'after'} divided by what the other touches predict; noise alone seldom exceeds 4.`), printed,
       make('div.controls.noprint', {}, make('label', { for: 'filter' }, 'show only'), input, previous, next, count),
       make('div.scroll', { id: 'touches-table', tabindex: 0, role: 'region', 'aria-label': 'table of the touches' }, make('table', {}, make('thead', {}, make('tr', {}, ...heads)), body)));
+    touchRows = (printed) => { size = printed ?? 50; page = 0; show(); };
     show();
   }
 

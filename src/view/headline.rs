@@ -30,6 +30,8 @@ pub struct Headline {
     pub sentence: String,
     /// What stands behind it, in a second one.
     pub detail: String,
+    /// Its grounds, in three lines.
+    pub why: Vec<String>,
 }
 
 /// Three digits that a person reads, µm.
@@ -114,7 +116,7 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
             (level, sentence, d.says.clone())
         }
     };
-    Headline { level, sentence, detail }
+    Headline { level, sentence, detail, why: super::why::why(m, parameters) }
 }
 
 /// The name of an effect.

@@ -4,12 +4,14 @@
 //! Nothing is computed here that a room above could say: [`gather`] takes a fit, its comparison, its diagnosis and its
 //! ladder, and puts beside each other what belongs together, in the words and units that are shown.
 
+mod command;
 mod headline;
 mod machine;
 mod next;
 mod parameters;
 pub mod record;
 mod touches;
+mod why;
 
 pub use headline::{Headline, Level};
 pub use next::{Act, Next};
@@ -27,6 +29,7 @@ use crate::study::tolerance::Tolerance;
 use crate::tables::Correction;
 use crate::units::um_from_mm;
 use record::{Errors, RunRecord, StudyRecord};
+use std::path::Path;
 
 /// The format line of a view.
 pub const FORMAT: &str = "axiscal-view/1";
@@ -48,6 +51,10 @@ pub struct RunFiles<'a> {
 pub struct Material<'a> {
     /// The study's file name, as a user would type it.
     pub study: &'a str,
+    /// Its path as the caller of the program typed it.
+    pub path: &'a Path,
+    /// The machines file that the study names.
+    pub machines_file: Option<&'a str>,
     /// SHA-256 of the study and all that it names.
     pub sha256: &'a str,
     /// Day of the data, YYYY-MM-DD.

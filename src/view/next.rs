@@ -1,6 +1,9 @@
 //! What to do next, the first thing first.
 
 use super::Material;
+use super::command::{
+    SUPPOSED_CONTROLLER, about_controller, beside_the_study, for_controller, larger_program, quoted, study,
+};
 use super::headline::{Headline, Level, capital, in_question, named, size, um};
 use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
@@ -54,9 +57,8 @@ impl Next {
 /// What to do, the first thing first.
 pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRecord], c: &Compensation) -> Vec<Next> {
     let mut out = Vec::new();
-    let study = m.study;
-    let controller = m.runs.iter().map(|r| r.controller).find(|c| *c != "csv").unwrap_or("YOUR-CONTROLLER");
-    let plan_next = format!("axiscal plan-next {study} --controller {controller} --out next");
+    let plan_next = format!("axiscal plan-next {} {} --out next", study(m), for_controller(m));
+    let about = about_controller(m);
     let d = m.diagnosis;
     match &d.verdict {
         _ if d.next_step() == NextStep::CorrectSetupMistake => {
@@ -66,8 +68,8 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
         }
         Verdict::TooLittleData(_) => out.push(Next::new(
             "Measure more touches",
-            "A larger program measures what this one cannot. First check that the log belongs to the plan and that the blocks are where it says.",
-            format!("axiscal generate --machine {} --program full --controller {controller} --out .", m.machine.name),
+            format!("A larger program measures what this one cannot. First check that the log belongs to the plan and that the blocks are where it says.{about}"),
+            larger_program(m),
         )),
         Verdict::MissingEffect(_) => {
             if let Some(first) = d.candidates.first() {
@@ -78,7 +80,7 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
             (NotNamed::WeakPattern, true) => {
                 out.push(Next::new(
                     "Measure more touches",
-                    "Repeats and further poses show whether the weak pattern is real.",
+                    format!("Repeats and further poses show whether the weak pattern is real.{about}"),
                     plan_next.clone(),
                 ).with(Act::MeasureMore));
                 // what could be wrong by more than its tolerance would be refused
@@ -88,10 +90,10 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
                     compensate(m, parameters, c, &mut out);
                 }
             }
-            (NotNamed::CannotBeConfirmed(effects), _) => which(m, effects, &plan_next, controller, &mut out),
+            (NotNamed::CannotBeConfirmed(effects), _) => which(m, effects, &plan_next, &mut out),
             (_, true) => {
                 let what = d.in_question().map_or_else(|| "one of these effects".to_owned(), |c| in_question(m, c));
-                let how = format!("Touches at further poses show whether it is {what}.");
+                let how = format!("Touches at further poses show whether it is {what}.{about}");
                 out.push(Next::new("Measure more index positions", how, plan_next.clone()).with(Act::MeasureMore));
             }
             (_, false) => unexplained(m, u, &mut out),
@@ -101,20 +103,21 @@ pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
                 let how = capital(&crate::words::diagnose::check_size(o));
                 out.push(Next::new(format!("Check {}: it is far too large", o.parameter), how, ""));
             }
-            settled(m, headline, parameters, c, controller, &mut out);
+            settled(m, headline, parameters, c, &mut out);
         }
     }
     if !m.fit.outcome.undetermined.is_empty() && (d.verdict == Verdict::Adequate || d.verdict.is_weak_pattern()) {
         let how = m.fit.outcome.undetermined.iter().flat_map(|u| u.parted_by.first()).next();
         let how = how.map_or_else(|| "A program that measures what these touches cannot.".to_owned(), Clone::clone);
-        out.push(Next::new("Measure what cannot be determined yet", capital(&how), plan_next).with(Act::MeasureMore));
+        let how = format!("{}{about}", capital(&how));
+        out.push(Next::new("Measure what cannot be determined yet", how, plan_next).with(Act::MeasureMore));
     }
     odd_touches(m, &mut out);
     out
 }
 
 /// Where several effects explain it and these poses cannot separate them: touches that can.
-fn which(m: &Material, open: &[String], plan_next: &str, controller: &str, out: &mut Vec<Next>) {
+fn which(m: &Material, open: &[String], plan_next: &str, out: &mut Vec<Next>) {
     const MOST: usize = 4;
     let mut names: Vec<String> = open.iter().take(MOST).map(|id| named(m, id)).collect();
     if open.len() > MOST {
@@ -123,7 +126,7 @@ fn which(m: &Material, open: &[String], plan_next: &str, controller: &str, out: 
     out.push(
         Next::new(
             "Measure further poses",
-            format!("The touches that show most of what may be missing: {}.", names.join("; ")),
+            format!("The touches that show most of what may be missing: {}.", names.join("; ")) + about_controller(m),
             plan_next,
         )
         .with(Act::MeasureMore),
@@ -131,7 +134,7 @@ fn which(m: &Material, open: &[String], plan_next: &str, controller: &str, out: 
     out.push(Next::new(
         "Or run the full program",
         "It has the poses in which every known effect shows, and some to confirm the answer.",
-        format!("axiscal generate --machine {} --program full --controller {controller} --out .", m.machine.name),
+        larger_program(m),
     ));
 }
 
@@ -150,7 +153,7 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
         Next::new(
             "Add it to the model",
             "The error falls and the other values become right. This page then shows the next step.",
-            format!("axiscal add {} {}", m.study, first.effect),
+            format!("axiscal add {} {}", study(m), quoted(&first.effect)),
         )
         .with(Act::Add { effect: first.effect.clone() }),
     );
@@ -206,20 +209,13 @@ fn unexplained(m: &Material, found: &Unexplained, out: &mut Vec<Next>) {
         Next::new(
             "Write it as a formula",
             "A starting formula for what no known effect explains. Then add it to the model.",
-            format!("axiscal sketch-effect {} --out my-effects.toml", m.study),
+            format!("axiscal sketch-effect {} --out my-effects.toml", study(m)),
         )
         .with(Act::Sketch),
     );
 }
 
-fn settled(
-    m: &Material,
-    headline: &Headline,
-    parameters: &[ParameterRecord],
-    c: &Compensation,
-    controller: &str,
-    out: &mut Vec<Next>,
-) {
+fn settled(m: &Material, headline: &Headline, parameters: &[ParameterRecord], c: &Compensation, out: &mut Vec<Next>) {
     if let Some(why) = &c.refused {
         out.push(Next::new(
             "Do not compensate yet",
@@ -239,16 +235,17 @@ fn settled(
     if headline.level == Level::Good {
         out.push(Next::new(
             "Nothing needs to be done",
-            "Keep this page to compare the next measurement with it.",
-            format!("axiscal verify {} LATER-STUDY.toml", m.study),
+            "Keep this study. `axiscal verify` compares the next measurement with it.",
+            "",
         ));
     }
     if beyond.is_empty() && parameters.iter().any(|p| p.judgement == Judgement::Open) {
         out.push(
             Next::new(
                 "Measure more touches",
-                "The uncertainty is too large for this tolerance. Repeats and further poses reduce it.",
-                format!("axiscal plan-next {} --controller {controller} --out next", m.study),
+                "The uncertainty is too large for this tolerance. Repeats and further poses reduce it.".to_owned()
+                    + about_controller(m),
+                format!("axiscal plan-next {} {} --out next", study(m), for_controller(m)),
             )
             .with(Act::MeasureMore),
         );
@@ -261,6 +258,7 @@ fn compensate(m: &Material, parameters: &[ParameterRecord], c: &Compensation, ou
         return;
     }
     let (controller, accepts) = export_to(m);
+    let word = quoted(&controller);
     let mut how = "The values go into the control as its own tables. The README beside them says how, and what must be set again.".to_owned();
     if !accepts.is_empty() {
         how += &format!(
@@ -268,6 +266,7 @@ fn compensate(m: &Material, parameters: &[ParameterRecord], c: &Compensation, ou
             few(&accepts)
         );
     }
+    how += about_controller(m);
     if controller == crate::tables::linuxcnc::CONTROLLER {
         how += " With --ini FILE, the machine's INI file, its present values are added to; without it changes are listed in place of some values.";
     } else {
@@ -278,14 +277,14 @@ fn compensate(m: &Material, parameters: &[ParameterRecord], c: &Compensation, ou
         Next::new(
             "Load the compensation",
             how,
-            format!("axiscal export {} --controller {controller} --out compensation{flag}", m.study),
+            format!("axiscal export {} --controller {word} --out compensation{flag}", study(m)),
         )
         .with(Act::Export),
     );
     out.push(Next::new(
         "Measure again and compare",
-        "Run the same program with the compensation loaded. Comparing the two studies shows whether it works.",
-        format!("axiscal verify {} again.toml", m.study),
+        "Run the same program with the compensation loaded and make a study of it. `axiscal verify` compares the two and shows whether it works.",
+        "",
     ));
 }
 
@@ -297,17 +296,20 @@ fn few(names: &[String]) -> String {
 }
 
 /// The controller of the runs that has tables, and its entries that were not run on a real control.
-fn export_to<'a>(m: &Material<'a>) -> (&'a str, Vec<String>) {
+fn export_to(m: &Material) -> (String, Vec<String>) {
     let linuxcnc = crate::tables::linuxcnc::CONTROLLER;
     let of_runs = || m.runs.iter().map(|r| r.controller);
     let tables = |name: &str| Postprocessor::built_in_tables(name);
     let by_position = m.correction.is_ok_and(|c| !(c.shapes.is_empty() && c.across.is_empty()));
     if let Some(name) = of_runs().find(|name| *name == linuxcnc || tables(name).is_some()) {
-        return (name, tables(name).map_or_else(Vec::new, |t| control::not_run(m.machine, t, by_position)));
+        return (name.to_owned(), tables(name).map_or_else(Vec::new, |t| control::not_run(m.machine, t, by_position)));
     }
     // a file of the user's own: what it holds is not known here
     let own = of_runs().find(|name| name.ends_with(".toml") || name.contains('/'));
-    own.map_or(("YOUR-CONTROLLER", Vec::new()), |name| (name, vec![format!("entries of {name} that name no document")]))
+    match own {
+        Some(name) => (beside_the_study(m, name), vec![format!("entries of {name} that name no document")]),
+        None => (SUPPOSED_CONTROLLER.to_owned(), Vec::new()),
+    }
 }
 
 /// Outliers are a finding of their own.

@@ -98,6 +98,8 @@ pub fn verdict_of(
     let (correction, date) = possible_correction(loaded, fit, env);
     verdict_and_steps(&Material {
         study: &loaded.name(),
+        path: &loaded.path,
+        machines_file: loaded.study.machines.as_deref(),
         sha256: &loaded.sha256,
         date: &date,
         machine: &loaded.machine,
@@ -116,6 +118,8 @@ pub fn view_of(loaded: &Loaded, worked: &Worked) -> View {
     let runs = run_files(loaded);
     let verdict = Material {
         study: &loaded.name(),
+        path: &loaded.path,
+        machines_file: loaded.study.machines.as_deref(),
         sha256: &loaded.sha256,
         date: &worked.date,
         machine: &loaded.machine,

@@ -1,9 +1,11 @@
 // The report: opened from disk, with the network off.
 
-import { join } from "node:path";
-import { statSync } from "node:fs";
+import { execFileSync } from "node:child_process";
+import { dirname, join } from "node:path";
+import { copyFileSync, existsSync, mkdirSync, readFileSync, readdirSync, statSync } from "node:fs";
 import { pathToFileURL } from "node:url";
-import { accessible, axiscal, equal, holds, measured, picture, watched } from "./tools.mjs";
+import { filled } from "./pdf.mjs";
+import { HOSTILE, accessible, axiscal, equal, holds, hostile, measured, noHarm, picture, watched } from "./tools.mjs";
 
 async function opensFromDisk(t) {
   const { context, dir, out } = t;
@@ -60,28 +62,116 @@ async function firstScreen(t) {
   }
 }
 
-/** On A4: nothing is wider than the paper, every plot is there, and no page is nearly empty. */
+/** On A4: at most four sheets, none of them half empty, nothing wider than the paper, every plot, no button. */
 async function printed(t) {
   const folder = measured(t.dir, "print");
   const file = join(folder, "report.html");
-  axiscal("report", join(folder, "study.toml"), "--out", file);
+  for (const [what, effect] of [["effect-missing", null], ["complete", "squareness-xy"]]) {
+    if (effect) axiscal("add", join(folder, "study.toml"), effect);
+    axiscal("report", join(folder, "study.toml"), "--out", file);
+    await sheets(t, file, what);
+  }
+}
+
+async function sheets(t, file, what) {
   const [page, seen] = await watched(t.context);
   await page.goto(pathToFileURL(file).href);
   await page.waitForSelector("#parameters .main-svg");
-  const pdf = await page.pdf({ format: "A4", preferCSSPageSize: true, path: join(t.out, "report.pdf") });
-  const pages = (pdf.toString("latin1").match(/\/Type\s*\/Page\b(?!s)/g) ?? []).length;
-  holds(pages >= 5 && pages <= 10, `${pages} pages`);
+  const pdf = await page.pdf({ format: "A4", preferCSSPageSize: true, path: join(t.out, `report-${what}.pdf`) });
+  const full = filled(pdf);
+  console.log(`  ${what}: ${full.length} sheets, filled ${full.map((f) => f.toFixed(2)).join(", ")}`);
+  holds(full.length >= 2 && full.length <= 4, `${what}: ${full.length} sheets`);
+  holds(Math.min(...full) > 0.5, `${what}: sheets filled to ${full}`);
   // the page has been made ready as for paper, and is again as it was
   equal(await page.evaluate(() => document.documentElement.classList.contains("printing")), false);
+  await page.emulateMedia({ media: "print" });
   await page.evaluate(() => dispatchEvent(new Event("beforeprint")));
   await page.waitForTimeout(500);
+  equal(await page.evaluate(() => [...document.querySelectorAll("button:not(th button), select, input")].filter((e) => e.getClientRects().length).map((e) => e.outerHTML.slice(0, 80))), [], "controls on paper");
+  equal(await page.locator("#why > li").count(), 3, "lines of the grounds");
+  holds(await page.isVisible("#why"), "the grounds are not printed");
   const paper = await page.evaluate(() => {
     const width = document.body.getBoundingClientRect().width;
     const titles = [...document.querySelectorAll(".js-plotly-plot")].flatMap((plot) => [...plot.querySelectorAll(".xtitle")].map((title) => [title.textContent, title.getBoundingClientRect().left - plot.getBoundingClientRect().left, plot.getBoundingClientRect().right - title.getBoundingClientRect().right]));
     return { width, wide: [...document.querySelectorAll("figure, table, .card")].filter((e) => e.getBoundingClientRect().right > width + 1).map((e) => e.outerHTML.slice(0, 80)), cut: titles.filter(([, left, right]) => left < -1 || right < -1), undrawn: [...document.querySelectorAll(".plot")].filter((p) => !p.querySelector(".main-svg")).map((p) => p.id) };
   });
-  holds(/The 50 largest of \d+ touches/.test(await page.textContent("#touches-title >> xpath=..")), "which touches are printed is not said");
+  holds(/The \d+ largest of \d+ touches/.test(await page.textContent("#touches-title >> xpath=..")), "which touches are printed is not said");
   equal([paper.wide, paper.cut, paper.undrawn], [[], [], []], "wider than the paper, titles that are cut, plots that are not drawn");
+  equal(seen.errors, [], "errors in the console");
+}
+
+/** On a telephone: nothing is wider than the screen, and the results show name, value and verdict. */
+async function onATelephone(t) {
+  const folder = measured(t.dir, "telephone");
+  const file = join(folder, "report.html");
+  axiscal("report", join(folder, "study.toml"), "--out", file);
+  const [page, seen] = await watched(t.context);
+  for (const before of [390, 1280]) {
+    // opened there, and on a window that becomes as narrow
+    await page.setViewportSize({ width: before, height: 844 });
+    await page.goto(pathToFileURL(file).href);
+    await page.waitForSelector("#parameters .main-svg");
+    await page.setViewportSize({ width: 390, height: 844 });
+    await page.waitForTimeout(400);
+    const found = await page.evaluate(() => {
+      const table = document.querySelector("#results-table");
+      const seen = (e) => e.getClientRects().length > 0;
+      return { wide: document.documentElement.scrollWidth, right: table.getBoundingClientRect().right, own: table.scrollWidth - table.clientWidth,
+        heads: [...table.querySelectorAll("thead th")].filter(seen).map((e) => e.textContent),
+        rows: [...table.querySelectorAll("tbody tr")].map((r) => [...r.children].filter(seen).map((e) => e.textContent)) };
+    });
+    holds(found.wide <= 390 && found.right <= 390 && found.own <= 0, `${JSON.stringify({ ...found, rows: 0 })} on 390 px`);
+    equal(found.heads, ["error", "value ± 95 %", "verdict"]);
+    const squareness = found.rows.find(([name]) => name.startsWith("EC0Y"));
+    holds(/^\d+ ± \d+ urad$/.test(squareness[1]), squareness[1]);
+    equal(squareness[2], "too large");
+  }
+  await accessible(page, "report on a telephone");
+  await page.screenshot({ path: join(t.out, "report-telephone.png"), fullPage: true });
+  equal(seen.errors, [], "errors in the console");
+}
+
+/** What the button copies runs as it is, in a folder and with a study whose names have spaces. */
+async function copiedCommand(t) {
+  const made = measured(t.dir, "copied");
+  const above = join(t.dir, "folder of a person");
+  const folder = join(above, "my studies");
+  mkdirSync(folder, { recursive: true });
+  for (const file of readdirSync(made)) copyFileSync(join(made, file), join(folder, file === "study.toml" ? "my study.toml" : file));
+  const path = `${dirname(process.env.AXISCAL)}:${process.env.PATH}`;
+  const shell = (command) => execFileSync("sh", ["-c", command], { cwd: above, env: { ...process.env, PATH: path }, encoding: "utf8" });
+  shell('axiscal report "my studies/my study.toml"');
+  const [page, seen] = await watched(t.context);
+  await t.context.grantPermissions(["clipboard-read", "clipboard-write"]);
+  for (const verb of ["add", "export"]) {
+    await page.goto(pathToFileURL(join(above, "report.html")).href);
+    await page.click(`button[aria-label^="copy the command axiscal ${verb}"]`);
+    await page.waitForFunction(() => [...document.querySelectorAll("#next button")].some((b) => b.textContent === "copied"));
+    const command = await page.evaluate(() => navigator.clipboard.readText());
+    holds(command.includes('"my studies/my study.toml"'), command);
+    shell(command);
+    if (verb === "add") shell('axiscal report "my studies/my study.toml"');
+  }
+  holds(readFileSync(join(folder, "my study.toml"), "utf8").includes('"squareness-xy"'), "the command did not add the effect");
+  holds(existsSync(join(above, "compensation/compensation.json")), "the command did not export");
+  equal(seen.errors, [], "errors in the console");
+}
+
+/** Names of a study, a plan, a machine and an effect that look like HTML are text. */
+async function hostileNames(t) {
+  const study = hostile(t.dir, "report");
+  const file = join(t.dir, "hostile.html");
+  axiscal("report", study, "--out", file);
+  const [page, seen] = await watched(t.context);
+  await page.goto(pathToFileURL(file).href);
+  await page.waitForSelector("#parameters .main-svg");
+  for (let y = 0; y < await page.evaluate(() => document.body.scrollHeight); y += 700) {
+    await page.evaluate((to) => window.scrollTo(0, to), y);
+    await page.waitForTimeout(150);
+  }
+  await noHarm(page);
+  holds((await page.textContent("#about")).includes(HOSTILE), "the machine's description is not shown");
+  holds((await page.textContent("main")).includes(HOSTILE), "the effect's name is not shown");
   equal(seen.errors, [], "errors in the console");
 }
 
@@ -89,4 +179,7 @@ export const reportCases = [
   ["report_opens_from_disk_without_a_network", opensFromDisk],
   ["report_first_screen", firstScreen],
   ["report_printed", printed],
+  ["report_on_a_telephone", onATelephone],
+  ["report_copied_command_runs", copiedCommand],
+  ["report_hostile_names", hostileNames],
 ];

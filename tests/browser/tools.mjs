@@ -60,6 +60,43 @@ export function measured(dir, name) {
   return folder;
 }
 
+/** A name that would run if it were HTML, closed an attribute, or ended a script. */
+export const HOSTILE = "</script><img src=x onerror=window.harmed=1>\"'&amp;";
+
+/** A study whose own name and the names of its machine, blocks and effects are hostile; the path of it. */
+export function hostile(dir, name) {
+  const folder = measured(dir, `hostile-${name}`);
+  const at = (file) => join(folder, file);
+  const machines = readFileSync(join(process.env.AXISCAL_ROOT, "machines.toml"), "utf8");
+  const says = /(name = "swivel-head"\n(?:.*\n)*?says\s*= )"[^"\n]*"/;
+  holds(says.test(machines), "the machine has no description");
+  writeFileSync(at("machines.toml"), machines.replace(says, (_, before) => `${before}${JSON.stringify(HOSTILE)}`));
+  for (const program of ["head", "table"]) {
+    // a log names the plan that it belongs to; a CSV of touches does not
+    axiscal("parse", at(`${program}.log`), "--controller", "linuxcnc", "--plan", at(`${program}.plan.json`), "--out", at(`${program}.csv`));
+    const plan = JSON.parse(readFileSync(at(`${program}.plan.json`), "utf8"));
+    delete plan.fields_sha256;
+    const named = (block) => ({ ...block, name: `${block.name}${HOSTILE}` });
+    writeFileSync(at(`${program}.plan.json`), JSON.stringify({ ...plan, blocks: plan.blocks.map(named), touches: plan.touches.map((t) => ({ ...t, block: `${t.block}${HOSTILE}` })) }));
+  }
+  writeFileSync(at("my-effects.toml"), `[[effect]]
+id = "my-square"
+name = ${JSON.stringify(HOSTILE)}
+says = ${JSON.stringify(HOSTILE)}
+at = "Y"
+terms = [ { parameter = "mine", unit = "urad", dof = "dx", formula = "-Y", typical = 16 } ]
+`);
+  const study = at(`<img src=x onerror=window.harmed=1> "it's".toml`);
+  const text = readFileSync(at("study.toml"), "utf8").replaceAll(".log\"", ".csv\"").replaceAll('"linuxcnc"', '"csv"');
+  writeFileSync(study, `machines = "machines.toml"\neffects_file = ["my-effects.toml"]\n${text.replace(/(effects = \[\s*)/, '$1"my-square", ')}`);
+  return study;
+}
+
+/** Nothing of a hostile name has become an element. */
+export async function noHarm(page) {
+  equal(await page.evaluate(() => [window.harmed ?? 0, document.querySelectorAll("img[src=x]").length]), [0, 0], "a name ran as HTML");
+}
+
 /** Time constant of the machine that warms up. */
 export const RISE_H = 0.2;
 

@@ -1,0 +1,101 @@
+//! Commands that a person copies into a terminal: they run as they are written, in the folder in which the report was
+//! written.
+
+use super::Material;
+use crate::post::Postprocessor;
+use std::path::Path;
+
+/// What stands for the control where the touches come from no control's log.
+pub(super) const SUPPOSED_CONTROLLER: &str = "linuxcnc";
+
+/// A word as a shell takes it: POSIX shells, cmd and PowerShell agree on double quotes around spaces.
+pub(super) fn quoted(word: &str) -> String {
+    let plain = |c: char| c.is_alphanumeric() || "-_./\\:+,=@~".contains(c);
+    // what begins with a minus sign would be an option
+    let word = if word.starts_with('-') { format!("./{word}") } else { word.to_owned() };
+    if !word.is_empty() && word.chars().all(plain) && !word.starts_with('~') {
+        return word;
+    }
+    if word.contains(['"', '$', '`', '\\', '!', '%']) {
+        return format!("'{}'", word.replace('\'', "'\\''"));
+    }
+    format!("\"{word}\"")
+}
+
+/// The path of a file that the study names, as the caller of the program sees it.
+pub(super) fn beside_the_study(m: &Material, name: &str) -> String {
+    m.path.parent().unwrap_or(Path::new("")).join(name).display().to_string()
+}
+
+/// The study.
+pub(super) fn study(m: &Material) -> String {
+    quoted(&m.path.display().to_string())
+}
+
+/// The control that wrote the logs.
+pub(super) fn controller(m: &Material) -> Option<String> {
+    let is_file = |word: &str| word.ends_with(".toml") || word.contains('/');
+    // others only read what another program has measured, and no program can be written for them
+    let with_programs = Postprocessor::built_in().unwrap_or_default();
+    let named = |word: &str| with_programs.iter().any(|p| p.name == word);
+    let word = m.runs.iter().map(|r| r.controller).find(|c| named(c) || is_file(c))?;
+    Some(quoted(&if is_file(word) { beside_the_study(m, word) } else { word.to_owned() }))
+}
+
+/// `--controller NAME`.
+pub(super) fn for_controller(m: &Material) -> String {
+    format!("--controller {}", controller(m).unwrap_or_else(|| SUPPOSED_CONTROLLER.to_owned()))
+}
+
+/// What must be said beside a command whose control is only supposed.
+pub(super) fn about_controller(m: &Material) -> &'static str {
+    if controller(m).is_some() { "" } else { " Write the name of your control in place of linuxcnc." }
+}
+
+/// The larger program for the study's machine.
+pub(super) fn larger_program(m: &Material) -> String {
+    let machines = m.machines_file.map_or_else(String::new, |file| {
+        let path = beside_the_study(m, file);
+        format!(" --machines {}", quoted(&path))
+    });
+    let built_in = crate::program::built_in().unwrap_or_default();
+    let program = if crate::program::choose(built_in, "full", m.machine).is_ok() { "full" } else { "auto" };
+    format!(
+        "axiscal generate --machine {}{machines} --program {program} {} --out larger-program",
+        quoted(&m.machine.name),
+        for_controller(m)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shell_takes_every_word_as_one() {
+        for (word, expected) in [
+            ("study.toml", "study.toml"),
+            ("a b/my study.toml", "\"a b/my study.toml\""),
+            ("it's.toml", "\"it's.toml\""),
+            ("$HOME.toml", "'$HOME.toml'"),
+            ("a'$b", "'a'\\''$b'"),
+            ("a;b", "\"a;b\""),
+            ("-x.toml", "./-x.toml"),
+            ("C:\\data\\study.toml", "C:\\data\\study.toml"),
+            ("", "\"\""),
+        ] {
+            assert_eq!(quoted(word), expected);
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_real_shell_reads_the_words_back() {
+        for word in
+            ["a b", "it's", "$HOME `id` \\ \"x\"", "a'\"$b", "!x %y", "*?[a]{b,c}", "a;b&c|d>e<f(g)#h\t~", "é µ"]
+        {
+            let out = std::process::Command::new("sh").arg("-c").arg(format!("printf %s {}", quoted(word))).output();
+            assert_eq!(String::from_utf8_lossy(&out.unwrap().stdout), word);
+        }
+    }
+}
