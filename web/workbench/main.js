@@ -12,7 +12,7 @@ import "./space.js";
 import "./correlation.js";
 import "./touches.js";
 import "./formula.js";
-import { byId, show, significant } from "./words.js";
+import { byId, element, show, significant } from "./words.js";
 
 onOpen("plots", shownAgain);
 
@@ -56,6 +56,8 @@ function verdict() {
     : "The residual is larger than the noise. Searching for the missing effect …";
   show("verdict", known?.headline?.sentence ?? soFar);
   at.title = known?.headline?.detail ?? "";
+  byId("why").hidden = !known?.headline?.why.length;
+  byId("why-lines").replaceChildren(...(known?.headline?.why ?? []).map((line) => element("li", {}, line)));
   if (known?.failed.length) trouble({ messages: known.failed });
 }
 
