@@ -449,9 +449,26 @@ mod tests {
                 unit: "um".into(),
                 dof: "dz".into(),
                 formula: formula.into(),
+                typical: None,
             }],
             ..Draft::default()
         }
+    }
+
+    #[test]
+    fn a_row_is_the_draft_that_wrote_it() {
+        let mut written = draft("1 - exp(-t/tau)");
+        written.per = Some("block".into());
+        written.terms[0].typical = Some(2.5);
+        written.shape.push(DraftShape {
+            parameter: "tau".into(),
+            unit: "h".into(),
+            start: 0.5,
+            min: Some(0.1),
+            max: None,
+        });
+        assert_eq!(Draft::from_row(&row(&written)).unwrap(), written);
+        assert!(Draft::from_row("[[effect]]\nid = 3").is_err());
     }
 
     #[test]
