@@ -19,6 +19,8 @@ pub struct CheckedProgram<'a> {
     /// The control.
     pub post: &'a Postprocessor,
     pub plan: Option<&'a Plan>,
+    /// The plan as it was written: touches relative to an artefact that was put down by eye are others.
+    pub written: Option<&'a Plan>,
     /// Shapes of each part.
     pub scenes: &'a [Scene<'a>],
     /// Blocks and coordinates.

@@ -113,6 +113,8 @@ impl ExploredRun {
 pub struct Limits {
     /// How far a block may stand off, mm.
     pub placement_mm: f64,
+    /// How far an artefact that is being found may stand off, mm.
+    pub find_mm: f64,
     /// Way back between search and measuring touch, mm.
     pub back_off_mm: f64,
     /// A guarded move that ends so near its end counts as one without contact, mm; `None`: the control says whether there was one.
@@ -262,10 +264,10 @@ fn deviations(vm: &Vm, probe: &Probe, outcome: Outcome, limits: Limits) -> Vec<D
         let late = late.filter(|mm| *mm < 0.5 * way).map(|mm| 1.0 - mm / way);
         return [0.0, 0.5].into_iter().chain(late).map(Deviation::Contact).collect();
     }
-    if vm.hits == 0 {
+    if vm.searches() {
         const OUTSIDE: f64 = 1.2;
         const INSIDE: f64 = 0.4;
-        let mm = limits.placement_mm;
+        let mm = if vm.finding { limits.find_mm } else { limits.placement_mm };
         vec![
             Deviation::Miss,
             Deviation::Contact(0.0),

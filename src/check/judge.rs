@@ -15,6 +15,7 @@ use super::settings::settings_return;
 use super::touches::{Made, against_plan};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::Finding;
+use crate::log;
 use crate::program::heights::Lift;
 use crate::program::plan::ControllerFrame;
 use crate::program::scene::Scene;
@@ -157,6 +158,8 @@ struct Walk<'a, 'b> {
     lift: Option<Lift>,
     made: Vec<Made>,
     waited: bool,
+    /// How far the artefact may be off that is being found; `None`: it is found.
+    finding_mm: Option<f64>,
     /// The event that is judged, by its place in the record.
     index: usize,
 }
@@ -181,6 +184,7 @@ impl<'a, 'b> Walk<'a, 'b> {
             lift,
             made: Vec::new(),
             waited: false,
+            finding_mm: case.plan.and_then(|p| p.find.as_ref()).map(|find| find.room_mm),
             index: 0,
         }
     }
@@ -262,6 +266,9 @@ impl<'a, 'b> Walk<'a, 'b> {
                 }
             }
             Event::Log(text) => {
+                if log::says_found(text) {
+                    self.finding_mm = None;
+                }
                 if let Some(mut contact) = self.contact.take() {
                     contact.made.log = Some(text.clone());
                     contact.made.at = at.clone();

@@ -10,6 +10,7 @@
 //! [`crate::simulate`].
 
 mod branches;
+mod by_eye;
 mod called;
 mod checked_program;
 mod code;
@@ -35,7 +36,7 @@ mod touches;
 mod vm;
 mod world;
 
-use crate::diag::{Failure, Finding, Result, Source};
+use crate::diag::{Failure, Finding, Result, Severity, Source};
 use crate::machine::{Machine, Mounting};
 use crate::post::Postprocessor;
 use crate::program::plan::{ControllerFrame, Plan, Proof};
@@ -48,6 +49,7 @@ use judge::Judge;
 use run::Event;
 use runs::Kind;
 use statements::Compared;
+use nalgebra::Vector3;
 use std::ops::Range;
 use std::sync::Arc;
 use world::World;
@@ -132,7 +134,7 @@ fn check_whole(machine: &Machine, post: &Postprocessor, source: &Source, against
             let number = number(post, &program, source)?;
             let written = plan.programs.get(&post.name);
             let compared = written.filter(|w| !w.steps_sha256.is_empty()).map(|w| program.compare(w, post));
-            let mut checked = with_parts(machine, post, source, against, &program, parts_of_plan(machine, plan)?)?;
+            let mut checked = with_plan(machine, post, source, against, &program, plan)?;
             match (written, compared) {
                 (Some(written), Some(compared)) => {
                     as_written(written, &compared, &program, source, &checked.proof, &mut checked.findings);
@@ -286,6 +288,34 @@ pub fn wanted_beside(post: &Postprocessor, program: &Source) -> Vec<String> {
     masks.into_iter().chain(called::wanted(program.inner(), post)).collect()
 }
 
+/// Against a plan: where the artefact was put down by eye, also at each corner of the box in which it may stand.
+fn with_plan(
+    machine: &Machine,
+    post: &Postprocessor,
+    source: &Source,
+    against: &Against<'_>,
+    program: &runs::Program,
+    plan: &Plan,
+) -> Result<Checked> {
+    let parts = || parts_of_plan(machine, plan);
+    let Some(find) = &plan.find else {
+        return with_parts(machine, post, source, against, program, parts()?, against.plan);
+    };
+    let there = |off_mm: &Vector3<f64>| {
+        let expected = plan.relative_to(machine, off_mm);
+        let against = Against { plan: Some(&expected), ..*against };
+        let parts = by_eye::displaced(machine, plan, parts()?, off_mm);
+        with_parts(machine, post, source, &against, program, parts, Some(plan))
+    };
+    let mut checked = there(&Vector3::zeros())?;
+    if checked.findings.iter().all(|f| f.severity != Severity::Error) {
+        for corner in by_eye::corners(find) {
+            by_eye::add(&mut checked, there(&corner)?, &corner);
+        }
+    }
+    Ok(checked)
+}
+
 /// Tries each mounting of the machine and takes the one on which most touches are made.
 fn without_plan(
     machine: &Machine,
@@ -310,7 +340,7 @@ fn without_plan(
     let mut best: Option<Checked> = None;
     for mounting in candidates {
         let part = Part { machine: machine.clone(), mounting: mounting.clone() };
-        let checked = with_parts(machine, post, source, against, program, vec![part])?;
+        let checked = with_parts(machine, post, source, against, program, vec![part], None)?;
         let better = |b: &Checked| (checked.touches, b.findings.len()) > (b.touches, checked.findings.len());
         if best.as_ref().is_none_or(better) {
             best = Some(checked);
@@ -365,6 +395,7 @@ fn with_parts(
     against: &Against<'_>,
     program: &runs::Program,
     parts: Vec<Part>,
+    written: Option<&Plan>,
 ) -> Result<Checked> {
     let tcp = against.plan.is_some_and(|p| p.controller_frame == ControllerFrame::Tcp);
     let step = post.number.mm(10f64.powi(-(post.number.decimals as i32)));
@@ -374,18 +405,22 @@ fn with_parts(
         parts.iter().map(|p| Ok(Scene::new(&p.machine, &p.mounting)?.rounded(slack_mm))).collect::<Result<_>>()?;
     let bodies = parts.iter().map(|p| Errorless::new(&p.machine, Some(&p.mounting))).collect();
     let world = Arc::new(World::new(bodies, &machine.origin, tcp));
-    let stage = runs::Stage { machine, post, plan: against.plan, program, world: &world, scenes: &scenes };
+    // what may happen is followed where the artefact is at its place
+    let only_trunks = against.plan.zip(written).is_some_and(|(plan, written)| plan.touches != written.touches);
+    let stage = runs::Stage { machine, post, plan: against.plan, program, world: &world, scenes: &scenes, only_trunks };
     let opening = runs::opening(stage);
     // what the control rounds, and under a transformation what the rounding of three words does
     // a search that is a way along a vector: begin, way and end are rounded each
     let roundings = if program.is_relative() { 3.0 } else { 1.0 };
     // under a transformation the rounding of one word shows in the others as well
     let turned = if tcp { 3f64.sqrt() } else { 1.0 };
-    let same = 0.51 * roundings * turned * step + 1e-6 + if tcp { 1e-4 } else { 0.0 };
+    let found = if against.plan.is_some_and(|p| p.find.is_some()) { by_eye::FOUND_MM } else { 0.0 };
+    let same = 0.51 * roundings * turned * step + 1e-6 + if tcp { 1e-4 } else { 0.0 } + found;
     let case = CheckedProgram {
         machine,
         post,
         plan: against.plan,
+        written,
         scenes: &scenes,
         mountings: &parts.iter().map(|p| &p.mounting).collect::<Vec<_>>(),
         world: &world,

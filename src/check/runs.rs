@@ -80,6 +80,8 @@ pub struct Stage<'a> {
     pub world: &'a Arc<World>,
     /// Shapes of each part.
     pub scenes: &'a [Scene<'a>],
+    /// Only the runs in which all is as it should be: what may happen is followed where the artefact is at its place.
+    pub only_trunks: bool,
 }
 
 /// What is known before the runs are made.
@@ -109,12 +111,13 @@ struct Runs<'a, D> {
     program: &'a Program,
     world: &'a Arc<World>,
     scenes: &'a [Scene<'a>],
+    only_trunks: bool,
     dialect: std::marker::PhantomData<fn() -> D>,
 }
 
 impl<'a, D: Dialect> Runs<'a, D> {
-    fn new(Stage { machine, post, plan, program, world, scenes }: Stage<'a>) -> Self {
-        Self { machine, post, plan, program, world, scenes, dialect: std::marker::PhantomData }
+    fn new(Stage { machine, post, plan, program, world, scenes, only_trunks }: Stage<'a>) -> Self {
+        Self { machine, post, plan, program, world, scenes, only_trunks, dialect: std::marker::PhantomData }
     }
 
     /// The last number at which it can be told to begin: the last set-up, and one more that only gives the settings back.
@@ -131,11 +134,15 @@ impl<'a, D: Dialect> Runs<'a, D> {
     fn all(&self, opening: &Opening, each: &mut dyn FnMut(Kind, &ExploredRun)) -> All {
         let window = opening.window;
         let beginning = self.start(&window, 0.5, 0.3);
+        if self.only_trunks {
+            return self.trunks(beginning, each);
+        }
         // a touch takes a dozen, with the guarded moves to it
         const PER_TOUCH: usize = 50;
         let touches = self.plan.map_or(self.program.code.statements.len() / PER_TOUCH, |p| p.touches.len());
         let limits = Limits {
             placement_mm: self.machine.probe.placement_tolerance,
+            find_mm: self.plan.and_then(|p| p.find.as_ref()).map_or(0.0, |find| find.room_mm),
             back_off_mm: self.machine.probe.back_off,
             guard_mm: self.post.settings.get("missed_within").and_then(|mm| mm.trim().parse().ok()),
             probes: usize::MAX,
@@ -197,7 +204,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
             note(&mut all_taken, &refused);
             looked_at(Kind::Refused, &refused);
         }
-        if let Some(dry) = self.dry(beginning, limits) {
+        if let Some(dry) = self.dry(beginning, Some(limits)) {
             looked_at(Kind::Dry, &dry);
         }
         again.iter().for_each(|again| note(&mut all_taken, again));
@@ -213,6 +220,23 @@ impl<'a, D: Dialect> Runs<'a, D> {
         findings.extend(moving);
         let stops = stops(&whole.trunk);
         All { whole, beyond, findings, setups: self.program.setups, stops }
+    }
+
+    /// The whole run, those from each set-up, and the dry run, with nothing that happens otherwise.
+    fn trunks(&self, beginning: Position, each: &mut dyn FnMut(Kind, &ExploredRun)) -> All {
+        let whole = self.told(1, Start::Awkward, beginning, None);
+        each(Kind::Begun, &whole);
+        let numbers: Vec<u32> = (2..=self.last()).collect();
+        for some in numbers.chunks(rayon::current_num_threads().max(1)) {
+            let made: Vec<ExploredRun> =
+                some.par_iter().map(|k| self.told(*k, Start::Awkward, beginning, None)).collect();
+            made.iter().for_each(|told| each(Kind::Begun, told));
+        }
+        if let Some(dry) = self.dry(beginning, None) {
+            each(Kind::Dry, &dry);
+        }
+        let stops = stops(&whole.trunk);
+        All { whole, beyond: None, findings: Vec::new(), setups: self.program.setups, stops }
     }
 
     /// Under the control's own transformation the rotary axes must stand at 0: runs that find one of them elsewhere. And those in
@@ -282,6 +306,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
             stop_is_reminder: reminded,
             stuck: false,
             shift: [0.0; 3],
+            finding: self.plan.is_some_and(|p| p.find.is_some()),
             hits: 0,
             moved: true,
             asked: false,
@@ -316,13 +341,13 @@ impl<'a, D: Dialect> Runs<'a, D> {
     }
 
     /// The dry run, at the height that is written or else at the usual one.
-    fn dry(&self, at: Position, limits: Limits) -> Option<ExploredRun> {
+    fn dry(&self, at: Position, limits: Option<Limits>) -> Option<ExploredRun> {
         const USUAL_MM: f64 = 50.0;
         let (written, _) = self.program.dry_run()?;
         let usual = self.post.number.length(USUAL_MM).parse().unwrap_or(USUAL_MM);
         let mut run = self.run(1, Start::Awkward, at, 0, false);
         run.switched = self.program.switched(1, if written > 0.0 { written } else { usual });
-        let told = explore(run, 1, Some(limits), &|_| None).told;
+        let told = explore(run, 1, limits, &|_| None).told;
         Some(ExploredRun { start: Start::Awkward, ..told })
     }
 

@@ -208,7 +208,7 @@ fn times(case: &CheckedProgram<'_>, touches: &[log::RawTouch], lines: &[LogLine<
 
 /// The whole log must read as that of a complete run of this plan.
 fn whole_log(case: &CheckedProgram<'_>, text: &str, end: &Range<usize>, said: &mut CollectedFindings) {
-    let Some(plan) = case.plan else { return };
+    let Some(plan) = case.written else { return };
     let writer = log::Writer::Controller(case.post);
     let mut complain = |message: &str| {
         said.say(case, "check::log", end, format!("the log that it writes: {message}"), "");

@@ -3,6 +3,7 @@
 use super::seconds::Clock;
 use super::world::World;
 use crate::axes::{AxisName, Position};
+use crate::log;
 use crate::units::Plain;
 use std::ops::Range;
 use std::sync::Arc;
@@ -164,6 +165,8 @@ pub struct Vm {
     pub stuck: bool,
     /// How much further along X, Y, Z the blocks seem to stand, mm.
     pub shift: [f64; 3],
+    /// The artefact was put down by eye, and no line of the log says yet that it is found.
+    pub finding: bool,
     /// Searches that found a face since the last line of the log.
     pub hits: usize,
     /// An axis has moved since the last stop.
@@ -189,6 +192,12 @@ impl Vm {
         ((self.clock.seconds / tick_s + AFTER_A_TICK).floor() * tick_s).max(0.0)
     }
 
+    /// Is the next contact that of a search, and not that of the measuring touch behind it?
+    pub fn searches(&self) -> bool {
+        // touches that find the artefact write no line
+        if self.finding { self.hits.is_multiple_of(2) } else { self.hits == 0 }
+    }
+
     /// Is the probe deflected here?
     pub fn deflected(&self) -> bool {
         self.stuck || self.world.touches(self.part, &self.at, &self.shift)
@@ -206,7 +215,10 @@ impl Vm {
                     self.part = (self.part + 1).min(self.world.last_part());
                 }
             }
-            Event::Log(_) => self.hits = 0,
+            Event::Log(text) => {
+                self.hits = 0;
+                self.finding &= !log::says_found(text);
+            }
             Event::Move { .. } | Event::Release { .. } => self.moved = true,
             Event::Probe { probe, outcome, .. } => {
                 self.moved = true;

@@ -11,6 +11,7 @@ use crate::model::catalogue::Catalogue;
 use crate::post::Postprocessor;
 use crate::program::path::{Step, Stop};
 use crate::program::plan::{Plan, Proof};
+use crate::program::find::{MOST_ASTRAY_MM, is_placement_tolerance};
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
 use crate::report::fit::{number, table};
 use crate::workflow::auto_program::{AutoProgram, auto_program};
@@ -55,6 +56,9 @@ pub struct Args {
     /// Make each touch by the program's own routine, or by the control's measuring cycle
     #[arg(long, value_enum, default_value_t = TouchWith::Own)]
     touch_with: TouchWith,
+    /// The artefact, one sphere, is put down by eye: how far off it may stand, mm; the first touches find it
+    #[arg(long, value_name = "MM")]
+    placement_tolerance: Option<f64>,
     /// Refuse the program when a single touch cannot be reached, instead of leaving it out
     #[arg(long)]
     strict: bool,
@@ -78,10 +82,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         machine = mounted.machine.clone();
     }
     let auto = (args.program == AUTO).then(|| choose_touches(&machine, mounted.as_ref(), args)).transpose()?;
-    let spec = match &auto {
+    let mut spec = match &auto {
         Some(auto) => auto.spec.clone(),
         None => load_program(&args.program, &machine, io)?,
     };
+    if let Some(mm) = args.placement_tolerance {
+        spec.placement_tolerance_mm = Some(placement_tolerance(mm)?);
+    }
     let word = match (&args.postprocessor, &args.controller) {
         // a path without a folder or an ending would read as the name of a controller
         (Some(file), _) => Path::new(".").join(file).display().to_string(),
@@ -170,7 +177,17 @@ fn choose_touches(machine: &Machine, mounted: Option<&WithArtefact>, args: &Args
         return Err(Failure::new("program::unknown_mounting", says)
             .help(format!("name an artefact (--artefact sphere), or one of its mountings: {}", has())));
     };
-    auto_program(machine, &Catalogue::built_in()?, mounting, args.minutes)
+    let by_eye_mm = args.placement_tolerance.map(placement_tolerance).transpose()?;
+    auto_program(machine, &Catalogue::built_in()?, mounting, args.minutes, by_eye_mm)
+}
+
+/// How far off an artefact may stand that is put down by eye.
+fn placement_tolerance(mm: f64) -> Result<f64> {
+    if is_placement_tolerance(mm) {
+        return Ok(mm);
+    }
+    let says = format!("--placement-tolerance {mm}: more than 0 mm, at most {MOST_ASTRAY_MM}");
+    Err(Failure::new("cli::placement_tolerance", says).help("3 is what a careful eye leaves"))
 }
 
 /// A height at which the ball is over the blocks and not beyond every machine.

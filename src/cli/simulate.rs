@@ -7,7 +7,7 @@ use crate::files;
 use crate::log::{RawTouch, Status};
 use crate::machine::Machine;
 use crate::simulate::{self, Compensation, Scenario};
-use crate::workflow::simulated_log::simulated_log;
+use crate::workflow::simulated_log::log_of_program;
 use crate::workflow::{load_controller, load_plan};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
@@ -68,12 +68,12 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     };
     keep_existing(args)?;
     let bar = progress(plan.touches.len(), io);
-    let touches = simulate::run_with_progress(&machine, &plan, &scenario, compensation.as_ref(), &|done| {
+    let made = simulate::run_program(&machine, &plan, &scenario, compensation.as_ref(), &|done| {
         bar.inc(done as u64);
     });
     bar.finish_and_clear();
-    let touches = reported(touches?, io);
-    let text = simulated_log(&machine, &plan, &touches, post.as_ref());
+    let simulate::Made { touches, found_mm } = reported(made?, io);
+    let text = log_of_program(&machine, &plan, &touches, found_mm, post.as_ref());
     files::write_whole(&args.out, text.as_bytes())?;
     if post.is_some() && touches.iter().any(|t| t.temperature_deg_c.is_some()) {
         io.report(&[Finding::info(

@@ -304,6 +304,7 @@ pub fn as_plan(machine: &Machine, mounting: &Mounting, bundles: &[Bundle], time_
         ball_radius_mm: machine.probe.ball_radius,
         tool_length_mm: machine.tool.length_mm,
         placement_tolerance_mm: None,
+        find: None,
         blocks: mounting
             .blocks
             .iter()

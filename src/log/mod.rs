@@ -7,6 +7,7 @@
 pub mod centres;
 pub mod csv;
 mod finding_places;
+mod found;
 mod last_digit;
 mod matching;
 mod numbers;
@@ -27,6 +28,7 @@ pub use matching::match_to_plan;
 pub use parse::{Ending, ParsedLog, Rejected, parse, parse_run};
 pub use reader::Reader;
 pub use record::LogHeader;
+pub(crate) use record::says_found;
 pub use runs::RunFound;
 pub use setup_mistakes::{LogMistake, Supposed, suppose};
 pub use touch::{RawTouch, Status, Touch};
@@ -38,6 +40,7 @@ use crate::post::{Frame, Postprocessor, log_word};
 use crate::program::plan::Plan;
 use crate::program::plan_digest::{self, digest};
 use finding_places::Places;
+use nalgebra::Vector3;
 
 /// Who wrote a log.
 #[derive(Debug, Clone, Copy)]
@@ -60,6 +63,8 @@ pub struct MatchedLog {
     pub ending: Ending,
     /// The runs that the log holds.
     pub runs: Vec<RunFound>,
+    /// How far off its place an artefact stood that was put down by eye, mm along X, Y and Z with all rotary axes at 0.
+    pub found_mm: Option<Vector3<f64>>,
 }
 
 /// Reads a log and matches it to its plan.
@@ -121,12 +126,15 @@ pub fn read_run(
     if let Writer::Controller(_) = writer {
         to_axes(machine, plan, &mut parsed.touches).map_err(|f| joined(&findings, f))?;
     }
+    let found_mm = parsed.found_mm.or_else(|| found::by_touches(machine, plan, &parsed.touches));
+    let relative = plan.find.as_ref().zip(found_mm).map(|(_, off)| plan.relative_to(machine, &off));
+    let here = relative.as_ref().unwrap_or(plan);
     let form = position_rows::RowForm {
         per_touch: &parsed.per_touch,
         says_status: parsed.rows_say_status,
         lost: &parsed.rejected.lines,
     };
-    let (mut touches, more) = matching::match_at(machine, plan, parsed.touches, form, Some(&places), &parsed.rejected)
+    let (mut touches, more) = matching::match_at(machine, here, parsed.touches, form, Some(&places), &parsed.rejected)
         .map_err(|f| joined(&findings, f))?;
     findings.0.extend(more.0);
     touches.iter_mut().for_each(|t| t.digit_mm = digit_mm);
@@ -141,13 +149,14 @@ pub fn read_run(
     }
     let usable = touches.iter().filter(|t| t.status != Status::Elsewhere).count();
     let complete = usable == plan.touches.len() && parsed.ending != Ending::CutOff;
-    Ok((MatchedLog { touches, complete, ending: parsed.ending, runs: parsed.runs }, findings))
+    Ok((MatchedLog { touches, complete, ending: parsed.ending, runs: parsed.runs, found_mm }, findings))
 }
 
 /// A log of touches with numbers, without a head.
 fn of_touches(touches: Vec<RawTouch>, ending: Ending, rejected: Rejected, runs: Vec<RunFound>) -> ParsedLog {
     let (header, per_touch) = (None, Vec::new());
-    ParsedLog { touches, header, ending, rejected, columns: false, per_touch, rows_say_status: false, runs }
+    let found_mm = None;
+    ParsedLog { touches, header, found_mm, ending, rejected, columns: false, per_touch, rows_say_status: false, runs }
 }
 
 /// Is this the log of the plan's program? A log that was written with other numbers than those of the plan is refused: the fit would

@@ -11,6 +11,7 @@ use crate::diag::{Failure, Finding, Findings, Result};
 use crate::post::as_written::{EndOfLine, LengthUnit, Role};
 use crate::post::{LogRule, Postprocessor, log_word};
 use crate::units::mm_from_inch;
+use nalgebra::Vector3;
 use std::borrow::Cow;
 
 /// What a log holds. Positions are the control's own coordinates, mm and deg: [`super::to_axes`] makes axis positions of them.
@@ -20,6 +21,8 @@ pub struct ParsedLog {
     pub touches: Vec<RawTouch>,
     /// The head of that run.
     pub header: Option<LogHeader>,
+    /// How far off its place the run found the artefact, mm along X, Y and Z with all rotary axes at 0.
+    pub found_mm: Option<Vector3<f64>>,
     /// How the log ends.
     pub ending: Ending,
     /// Lines of that run that are not used.
@@ -187,11 +190,14 @@ pub fn parse_run(
     if unit == LengthUnit::Inch {
         touches.iter_mut().for_each(|t| t.position = t.position.with_xyz_mm(t.position.xyz_mm().map(mm_from_inch)));
     }
+    let off = run.found.map(Vector3::from);
+    let found_mm = if unit == LengthUnit::Inch { off.map(|off| off.map(mm_from_inch)) } else { off };
     let per_touch = columns.map(|c| c.per_touch.clone()).unwrap_or_default();
     let rows_say_status = columns.is_some_and(|c| !c.status.is_empty());
     findings.finish(ParsedLog {
         touches,
         header: run.header,
+        found_mm,
         ending,
         rejected,
         columns: is_columns,

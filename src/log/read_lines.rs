@@ -36,6 +36,8 @@ pub struct Event<'a> {
 pub enum LineKind {
     /// A run begins.
     Head(Box<LogHeader>),
+    /// Where the artefact was found.
+    Found([f64; 3]),
     /// A run has come to its end; number of touches of the plan.
     End(u64),
     /// Not understood, or the touch in it may be cut off.
@@ -106,6 +108,7 @@ impl Reader<'_> {
                 None
             }
             Ok(Record::Head(head)) => Some(LineKind::Head(Box::new(head))),
+            Ok(Record::Found(off)) => Some(LineKind::Found(off)),
             Ok(Record::End(count)) => Some(LineKind::End(count)),
             Ok(Record::Blank) => None,
             Err(_) => Some(LineKind::Fault),

@@ -19,6 +19,8 @@ pub enum Record {
     /// A run begins.
     Head(LogHeader),
     Touch(RawTouch),
+    /// Where an artefact was found that was put down by eye: how far off its place along X, Y and Z.
+    Found([f64; 3]),
     /// A run has come to its end; number of touches of the plan.
     End(u64),
     /// Nothing.
@@ -80,6 +82,7 @@ pub fn record(line: &[u8], line_number: usize, rule: &LogRule) -> Result<Record,
         _ if rule.skip.iter().any(|s| without_leader(line).starts_with(s.as_bytes())) => Ok(Record::Blank),
         b'P' => touch(line, rest, line_number, rule).map(Record::Touch),
         b'H' => head(line, rest, line_number).map(Record::Head),
+        b'F' => found(line, rest, rule).map(Record::Found),
         b'E' => end(line, rest).map(Record::End),
         _ => Err(Fault::at(
             line,
@@ -186,6 +189,40 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
         }
     }
     Ok(RawTouch { id: Some(id), position, present, status, time_s, temperature_deg_c: None, line: line_number })
+}
+
+/// `F X2.5 Y-1 Z0.3 K1.8`: where an artefact was found.
+fn found(line: &[u8], mut rest: &[u8], rule: &LogRule) -> Result<[f64; 3], Fault> {
+    let mut off = [0.0; 3];
+    let mut sum = 0.0;
+    let cut = |what: &str| Fault::at(line, &line[line.len()..], 1, "log::cut_line", format!("the line ends without {what}"));
+    let mut word = |letter: u8| -> Result<f64, Fault> {
+        rest = blanks(rest);
+        let Some((_, after)) = rest.split_first().filter(|(first, _)| **first == letter) else {
+            return Err(cut(&format!("{}", letter as char)));
+        };
+        let (tail, number) = value(line, after, rule)?;
+        exact(line, rest, rest.len() - tail.len(), number, rule)?;
+        rest = tail;
+        Ok(number.value)
+    };
+    for (slot, letter) in off.iter_mut().zip(*b"XYZ") {
+        *slot = word(letter)?;
+        sum += *slot;
+    }
+    if let Some(letter) = rule.check_word {
+        let check = word(letter)?;
+        if off_sum(check - sum, rule.check_modulo) > sum_room(rule, off.len()) {
+            let message = format!("the numbers add up to {sum:.6}, the line says {check:.6}: it was damaged or edited");
+            return Err(Fault::at(line, line, line.len(), "log::sum", message));
+        }
+    }
+    if blanks(rest).is_empty() { Ok(off) } else { Err(Fault::at(line, rest, 1, "log::unknown_word", format!("unknown word {}", show(rest)))) }
+}
+
+/// Is a line of the log that which says where an artefact was found?
+pub(crate) fn says_found(line: &str) -> bool {
+    line.starts_with('F')
 }
 
 /// How far a sum is off the one that it should be; whole multiples of the modulo do not count.

@@ -39,6 +39,8 @@ pub struct Run {
     pub header: Option<LogHeader>,
     /// Touches of the log, in order.
     touches: Vec<Range<usize>>,
+    /// Where the artefact was found, in the unit of the log; after a second start the last one.
+    pub found: Option<[f64; 3]>,
     /// Count of touches of the plan, and line.
     pub end: Option<(u64, usize)>,
     last_line: usize,
@@ -164,6 +166,10 @@ pub fn split(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&L
                 run.resumed.push((None, number));
             }
             LineKind::Fault => {}
+            LineKind::Found(off) => {
+                run.found = Some(*off);
+                run.last_line = number;
+            }
             LineKind::Head(header) => {
                 let goes_on = header.setup > 1
                     && run.end.is_none()
@@ -214,6 +220,8 @@ fn beginnings(touches: &[RawTouch], events: &[Event<'_>], may_be_head: impl Fn(&
     for event in events {
         match event.kind {
             LineKind::Fault => unread.extend(may_be_head(&event.line).then_some(event.at)),
+            // it stands right behind a head
+            LineKind::Found(_) => {}
             LineKind::Head(_) | LineKind::End(_) => {
                 again(touches, from..event.at, &unread, &mut out);
                 from = event.at;

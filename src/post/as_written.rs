@@ -338,6 +338,12 @@ pub struct Write {
     pub rotary: Entry,
     /// The first moves have brought X, Y and Z to a known place at the top of the lift: the program may look whether the axes stand there.
     pub arrived: Option<Entry>,
+    /// What a touch that finds the artefact adds to what was found; absent: programs for one that was put down by eye are refused.
+    pub found: Option<Entry>,
+    /// From here on moves are relative to what was found.
+    pub shift: Option<Entry>,
+    /// The artefact is found: too far off, the program stops; else what was found goes into the log.
+    pub find_end: Option<Entry>,
     /// Positioning that stops when the probe triggers.
     pub protected: Entry,
     /// One touch.

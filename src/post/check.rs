@@ -437,13 +437,16 @@ impl Check<'_> {
             .into_iter()
             .chain(write.stop.as_ref().map(|entry| ("stop", entry)))
             .chain(write.arrived.as_ref().map(|entry| ("arrived", entry)))
+            .chain(write.found.as_ref().map(|entry| ("found", entry)))
+            .chain(write.shift.as_ref().map(|entry| ("shift", entry)))
+            .chain(write.find_end.as_ref().map(|entry| ("find_end", entry)))
         {
             self.origin(&format!("write.{name}"), &entry.source, &entry.unverified, &entry.template.span());
             self.template(&mut env, name, &entry.template);
         }
         for (name, part) in &file.parts {
             if entries.iter().any(|(taken, _)| taken == name)
-                || ["stop", "arrived", "log_file"].contains(&name.as_str())
+                || ["stop", "arrived", "found", "shift", "find_end", "log_file"].contains(&name.as_str())
             {
                 let message = format!("[parts.{name}] has the name of a template of [write]");
                 self.error(&part.template.span(), "post::part", message, "give it another name");

@@ -1,5 +1,6 @@
 //! A proven path → the text of the program. Every word of it comes from the templates of the postprocessor file.
 
+mod find;
 mod notes;
 mod routines;
 mod touch;
@@ -211,6 +212,7 @@ impl<'a> Writer<'a> {
 
     fn check_input(&mut self) -> Result<()> {
         self.post.check_program_number()?;
+        self.check_find()?;
         if let Some(axis) = self.axes.iter().find(|a| !self.post.result.contains_key(a)) {
             return Err(Failure::new(
                 "post::no_result",
@@ -219,9 +221,7 @@ impl<'a> Writer<'a> {
             .help("write it under [result] in the postprocessor file"));
         }
         for step in &self.path.steps {
-            if let Step::Touch(touch) = step
-                && touch.id == 0
-            {
+            if step.touch().is_some_and(|touch| touch.id == 0) {
                 return Err(Failure::new("post::touch_zero", "a touch has the number 0")
                     .help("number the touches of the plan from 1: 0 means \"all is well\" at the control"));
             }
@@ -294,6 +294,8 @@ impl<'a> Writer<'a> {
             nc_name => self.post.nc_name(&self.plan.program),
             unit => if self.post.log.unit == LengthUnit::Inch { "inch" } else { "mm" },
             touches => self.plan.touches.len(),
+            find => self.plan.find.is_some(),
+            find_room => self.find_room(),
             log_decimals => self.post.log.decimals,
             log_whole_places => self.post.log.whole_places,
             log_modulo => self.post.log.check_modulo.map_or_else(String::new, |m| format!("{m:.0}.")),
@@ -324,7 +326,7 @@ impl<'a> Writer<'a> {
     /// The touch that comes next, or the last one when none does.
     pub(super) fn next_touch(&self) -> Named {
         let named = |t: &TouchStep| Named { id: t.id, says: t.says.clone() };
-        let touch = |s: &'a Step| if let Step::Touch(t) = s { Some(t) } else { None };
+        let touch = |s: &'a Step| s.touch();
         let (before, after) = self.path.steps.split_at(self.index.min(self.path.steps.len()));
         after.iter().find_map(touch).or_else(|| before.iter().rev().find_map(touch)).map(named).unwrap_or_default()
     }
@@ -443,7 +445,13 @@ impl<'a> Writer<'a> {
                 self.moved(to);
                 Ok(())
             }
-            Step::Touch(touch) => self.touch(touch),
+            Step::Touch(touch) | Step::Find(touch) => self.touch(touch),
+            Step::Found { moves } => self.found(moves),
+            Step::Shift { matrix } => {
+                let rows = self.shift_rows(matrix);
+                self.render("shift", context! { rows })
+            }
+            Step::FindEnd => self.find_end(),
             Step::Retract { to, feed } => {
                 let words = self.words(&self.linear_words(to)?)?;
                 let to_start = self.is_start(to);

@@ -71,8 +71,21 @@ impl Postprocessor {
     /// The log that the program of a plan would have left, had the machine touched like this.
     #[must_use]
     pub fn log_text(&self, machine: &Machine, plan: &Plan, records: &[LogRecord]) -> String {
+        self.log_text_found(machine, plan, None, records)
+    }
+
+    /// The same of a program that found its artefact so far off its place, mm along X, Y and Z.
+    #[must_use]
+    pub fn log_text_found(
+        &self,
+        machine: &Machine,
+        plan: &Plan,
+        found_mm: Option<[f64; 3]>,
+        records: &[LogRecord],
+    ) -> String {
         let axes: Vec<AxisName> = AxisName::ALL.into_iter().filter(|a| machine.axis(*a).is_some()).collect();
         let mut lines = vec![format!("{}1", head(self, plan))];
+        lines.extend(found_mm.map(|off| self.found_line(off)));
         let numbered = plan.numbered();
         for record in records {
             let length = numbered.touch(record.id).and_then(|t| t.tool_length_mm).unwrap_or(plan.tool_length_mm);
@@ -111,6 +124,24 @@ impl Postprocessor {
             _ => "\n",
         };
         lines.iter().flat_map(|line| [self.log.prefix.as_str(), line, eol]).collect()
+    }
+}
+
+impl Postprocessor {
+    /// The line that says where the artefact was found.
+    fn found_line(&self, off_mm: [f64; 3]) -> String {
+        let off = if self.log.unit == LengthUnit::Inch { off_mm.map(inch_from_mm) } else { off_mm };
+        let mut line = "F".to_owned();
+        for (axis, value) in ["X", "Y", "Z"].into_iter().zip(off) {
+            // writing into a String cannot fail
+            let _ = write!(line, " {axis}{}", self.log.number(value));
+        }
+        if let Some(letter) = self.log.check_word {
+            let sum: f64 = off.iter().sum();
+            let sum = self.log.check_modulo.map_or(sum, |modulo| sum % modulo);
+            let _ = write!(line, " {}{}", letter as char, self.log.number(sum));
+        }
+        line
     }
 }
 

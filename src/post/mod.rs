@@ -271,6 +271,12 @@ impl Postprocessor {
         self.templates.get_template("stop").is_ok()
     }
 
+    /// Whether a program may find an artefact that was put down by eye.
+    #[must_use]
+    pub fn finds(&self) -> bool {
+        ["found", "shift", "find_end"].iter().all(|name| self.templates.get_template(name).is_ok())
+    }
+
     /// A program looks whether its first moves have brought the axes to where it sent them.
     pub fn looks_on_arrival(&self) -> bool {
         self.templates.get_template("arrived").is_ok()

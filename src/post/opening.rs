@@ -158,11 +158,13 @@ impl Writer<'_> {
         if self.frame.is_tcp() && self.frame.length_mm().to_bits() != self.plan.tool_length_mm.to_bits() {
             return Ok(None);
         }
-        let (mut stands, mut places): (_, Vec<(AxisMap, AxisMap)>) = (opening, Vec::new());
+        let (mut stands, mut moves) = (opening, Vec::new());
         for step in way {
             match step {
                 Step::Rotary { to, sense } => {
-                    places.extend(self.rotary_steps(&stands, to)?.into_iter().map(|place| (place, *sense)));
+                    for place in self.rotary_steps(&stands, to)? {
+                        moves.push(self.words_by(&place, sense)?);
+                    }
                     stands = to.or(&stands);
                 }
                 Step::Rapid { to } => {
@@ -173,11 +175,12 @@ impl Writer<'_> {
                     } else {
                         *to
                     };
-                    places.push((place, AxisMap::default()));
+                    moves.push(self.words(&place)?);
                 }
+                Step::Shift { matrix } => moves.push(context! { shift => self.shift_rows(matrix) }),
                 _ => return Err(self.broken("the way to a set-up holds more than rapids and turns".into())),
             }
         }
-        Ok(Some(places.iter().map(|(place, sense)| self.words_by(place, sense)).collect::<Result<_>>()?))
+        Ok(Some(moves))
     }
 }

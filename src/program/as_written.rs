@@ -32,6 +32,10 @@ pub struct File {
     /// What the names of faces mean: the block's own faces at all axes 0, or machine directions at the pose.
     #[serde(default)]
     pub faces_in: FacesIn,
+    /// The artefact, one sphere, is put down by eye: how far it may stand from its place along X, Y and Z, mm. The first touches
+    /// find it. Without it, it stands within the `placement_tolerance` of the machine's probe.
+    #[schemars(with = "Option<f64>")]
+    pub placement_tolerance: Option<Spanned<f64>>,
     /// How often each point is touched, where a stage or a set-up does not say otherwise.
     #[schemars(with = "Option<i64>")]
     pub repeats: Option<Spanned<i64>>,

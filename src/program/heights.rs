@@ -91,6 +91,7 @@ impl Scene<'_> {
             let highest = obstacle.solid.extent(carrier, &up);
             for (part, solid) in &self.parts {
                 let lowest = -solid.extent(&placed.tool, &-up);
+                let room = room + self.astray_mm(obstacle.role, true);
                 let height = (highest + room - lowest) / rise.norm();
                 heights.over_all = heights.over_all.max(height);
                 if *part == Part::Ball && obstacle.role != Role::Fixed {
@@ -150,7 +151,8 @@ impl Scene<'_> {
             let frame = |at: &Position| self.machine.carrier_frame(*carrier, at);
             let highest = farthest(&chain, &obstacle.solid, &at, &frame, &up, window) + drift(Side::Workpiece);
             let probe = &self.machine.probe;
-            lowest - highest >= probe.clearance + probe.placement_tolerance
+            lowest - highest
+                >= probe.clearance + probe.placement_tolerance + self.by_eye.map_or(0.0, |by_eye| by_eye.astray_mm)
         })
     }
 }

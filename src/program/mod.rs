@@ -6,6 +6,7 @@
 
 pub mod as_written;
 mod clock;
+pub mod find;
 pub mod heights;
 pub mod layout;
 mod library;
@@ -20,6 +21,7 @@ mod reach;
 pub mod ring_points;
 mod rotary_turns;
 mod route;
+mod route_find;
 pub mod scene;
 pub mod spec;
 mod stops;
@@ -75,13 +77,23 @@ pub fn schema() -> schemars::Schema {
 /// When the program does not fit the machine, nothing (or with [`Options::strict`]: not everything) can be reached, or the
 /// proof finds a move that is not clear.
 pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Result<(Generated, Findings)> {
+    let by_eye_mm = spec.placement_tolerance_mm.filter(|mm| *mm > machine.probe.placement_tolerance);
+    // all places lie so far inside that they may be relative to wherever the artefact stands
+    let inside = by_eye_mm.map(|mm| find::with_reserve(machine, find::farthest_mm(mm)));
+    let (whole, machine) = (machine, inside.as_ref().unwrap_or(machine));
     let (layout, mut findings) = layout::lay_out(machine, spec)?;
-    let scenes: Vec<scene::Scene> =
-        layout.parts.iter().map(|p| scene::Scene::new(&p.machine, p.mounting)).collect::<Result<_>>()?;
+    let by_eye = by_eye_mm.map(|mm| scene::ByEye { astray_mm: find::farthest_mm(mm), found: true });
+    let scene_of = |p| {
+        let parts::Part { machine, mounting, .. }: &parts::Part<'_> = p;
+        scene::Scene::new(machine, mounting).map(|scene| scene.put_by_eye(by_eye))
+    };
+    let scenes: Vec<scene::Scene> = layout.parts.iter().map(scene_of).collect::<Result<_>>()?;
     for scene in &scenes {
         scene.blocks_clear_of_each_other()?;
     }
-    let mut routed = route::route(&scenes, &layout, spec, options.tcp)?;
+    let finding = by_eye_mm.map(|mm| finding(&layout, &scenes, options, mm)).transpose()?;
+    let finding = finding.as_ref().map(|(scene, find)| (scene, find));
+    let mut routed = route::route(&scenes, finding, &layout, spec, options.tcp)?;
     let groups = skipped_groups(&routed.skipped);
     for group in &groups {
         let message = format!(
@@ -136,6 +148,7 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
         ball_radius_mm: own.probe.ball_radius,
         tool_length_mm: own.tool.length_mm,
         placement_tolerance_mm: Some(machine.probe.placement_tolerance),
+        find: finding.map(|(_, find)| find.clone()),
         blocks: parts::plan_blocks(&layout.parts),
         touches: routed.touches,
         skipped: routed.skipped,
@@ -143,7 +156,7 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
         programs: std::collections::BTreeMap::new(),
     };
     let generated = Generated { plan, path: routed.path };
-    let violations = verify(machine, &generated.plan, &generated.path)?;
+    let violations = verify(whole, &generated.plan, &generated.path)?;
     if !violations.is_empty() {
         let findings = violations.iter().map(|v| {
             Finding::error("program::unproven", format!("step {} of the path: {}", v.step + 1, v.says))
@@ -152,4 +165,29 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
         return Err(Failure(findings.collect()));
     }
     Ok((generated, findings))
+}
+
+/// How an artefact that is put down by eye is found: what must be left free until then, and the touches.
+///
+/// # Errors
+/// Why it is not found by touches.
+fn finding<'m>(
+    layout: &'m layout::Layout<'_>,
+    scenes: &[scene::Scene<'m>],
+    options: &Options,
+    tolerance_mm: f64,
+) -> Result<(scene::Scene<'m>, plan::Find)> {
+    let refuse = |why: &str, help: &str| Failure::new("program::find", format!("placement_tolerance: {why}")).help(help);
+    if options.tcp {
+        let why = "under the control's own transformation an artefact is not found by touches";
+        return Err(refuse(why, "generate without --tcp, or place it within the tolerance of the machine"));
+    }
+    let ([part], Some(lift)) = (layout.parts.as_slice(), scenes.first().and_then(scene::Scene::lift)) else {
+        let why = "the program stops for another artefact or stylus, which would have to be found anew";
+        return Err(refuse(why, "a program of one artefact and one stylus"));
+    };
+    let by_eye = scene::ByEye { astray_mm: find::farthest_mm(tolerance_mm), found: false };
+    let unfound = scene::Scene::new(&part.machine, part.mounting)?.put_by_eye(Some(by_eye));
+    let touches = find::touches(&unfound, &lift, find::sphere(part.mounting)?, tolerance_mm)?;
+    Ok((unfound, touches))
 }

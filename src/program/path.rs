@@ -3,6 +3,7 @@
 //! A [`Step`] says what the control must do and what it may rely on; nothing here knows a controller's language.
 
 use crate::axes::AxisMap;
+use nalgebra::Matrix3;
 
 /// One step of a program. Positions are NC coordinates relative to R, mm and deg; feeds mm/min.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,12 +52,37 @@ pub enum Step {
     },
     /// One touch: search from where the ball stands (the touch's `start`), back off, measure, log.
     Touch(TouchStep),
+    /// A touch that finds the artefact: like a touch, but none of the plan's, and its search is longer.
+    Find(TouchStep),
+    /// What the find touch just made adds to what was found: mm along an axis for each mm that it triggered further along its search.
+    Found {
+        /// The axis and how much.
+        moves: AxisMap,
+    },
+    /// From here on all places of linear axes are relative to what was found; no axis moves by that.
+    Shift {
+        /// By how much X, Y and Z are further, for each mm that was found along X, Y and Z (columns).
+        matrix: Matrix3<f64>,
+    },
+    /// The artefact is found: further off than the tolerance the program stops, and what was found goes into the log.
+    FindEnd,
     /// Straight back from contact to the touch's start: the probe may still be deflected when it begins.
     Retract {
         /// The axes that move.
         to: AxisMap,
         feed: f64,
     },
+}
+
+impl Step {
+    /// The touch that it makes, if it makes one.
+    #[must_use]
+    pub fn touch(&self) -> Option<&TouchStep> {
+        match self {
+            Self::Touch(touch) | Self::Find(touch) => Some(touch),
+            _ => None,
+        }
+    }
 }
 
 /// What a person does while the program stands, and what is mounted then.

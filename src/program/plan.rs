@@ -38,6 +38,9 @@ pub struct Plan {
     /// How far a block may stand from where it should.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub placement_tolerance_mm: Option<f64>,
+    /// The artefact was put down by eye: how the program finds it before its first touch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub find: Option<Find>,
     pub blocks: Vec<PlanBlock>,
     /// The touches, in the order in which they are made.
     pub touches: Vec<PlanTouch>,
@@ -50,6 +53,43 @@ pub struct Plan {
     /// What the programs do that were written for this plan, by controller: `check` shows whether one was changed.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub programs: BTreeMap<String, Proof>,
+}
+
+/// How a program finds an artefact that was put down by eye. All rotary axes stand at 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Find {
+    /// The block's name.
+    pub block: String,
+    /// How far it may stand from its place along each of X, Y and Z.
+    pub tolerance_mm: f64,
+    /// How far from its nominal place one of these touches may trigger.
+    pub room_mm: f64,
+    /// In the order in which they are made. They are in no log: the log holds what they found.
+    pub touches: Vec<FindTouch>,
+}
+
+/// A touch that finds the artefact. Its places are nominal: those after the first are made relative to what was found by then.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FindTouch {
+    /// For messages.
+    pub face: String,
+    /// Where the search begins.
+    pub start: AxisMap,
+    /// Where an errorless machine triggers on an artefact at its place.
+    pub nominal: AxisMap,
+    /// Where the search gives up.
+    pub end: AxisMap,
+    /// By how much what was found changes for each mm that the probe triggers further along the search.
+    pub moves: AxisMap,
+}
+
+impl Find {
+    /// From this touch on moves are relative to what it has found: the last one of an axis.
+    #[must_use]
+    pub fn counts_after(&self, place: usize) -> bool {
+        let axis = |place: usize| self.touches.get(place).map(|t| t.moves.iter().map(|(a, _)| a).collect::<Vec<_>>());
+        axis(place) != axis(place + 1)
+    }
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)] // serde's signature

@@ -31,7 +31,19 @@ const OF_PLAN: [(&str, OfPlan); 8] = [
     ("controller_frame", |c, p| c.whole(u64::from(p.controller_frame == ControllerFrame::Tcp))),
     ("ball_radius_mm", |c, p| c.number(p.ball_radius_mm)),
     ("tool_length_mm", |c, p| c.number(p.tool_length_mm)),
-    ("placement_tolerance_mm", |c, p| c.maybe(p.placement_tolerance_mm)),
+    ("placement_tolerance_mm", |c, p| {
+        c.maybe(p.placement_tolerance_mm);
+        // plans of artefacts that stand within it keep the digest that they always had
+        if let Some(find) = &p.find {
+            c.text(&find.block);
+            c.number(find.tolerance_mm);
+            c.number(find.room_mm);
+            for t in &find.touches {
+                c.text(&t.face);
+                [&t.start, &t.nominal, &t.end, &t.moves].into_iter().for_each(|map| c.axes(map));
+            }
+        }
+    }),
 ];
 
 const OF_BLOCKS: [(&str, OfBlock); 5] = [

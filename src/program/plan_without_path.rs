@@ -71,6 +71,7 @@ pub fn plan_without_path(machine: &Machine, spec: &ProgramSpec) -> Result<Plan> 
         ball_radius_mm: one.machine.probe.ball_radius,
         tool_length_mm: one.machine.tool.length_mm,
         placement_tolerance_mm: None,
+        find: None,
         blocks: plan_blocks(&layout.parts),
         touches,
         skipped: Vec::new(),

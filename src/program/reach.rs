@@ -112,7 +112,7 @@ impl Scene<'_> {
 }
 
 /// A position with its numbers rounded to nine decimals, [`PLACES_MM`].
-fn tidy(at: &Position) -> Position {
+pub(super) fn tidy(at: &Position) -> Position {
     // through the text: that is the shortest spelling of the number; adding zero turns -0 into 0
     Position(at.0.map(|v| format!("{v:.9}").parse::<f64>().unwrap_or(v) + 0.0))
 }

@@ -8,7 +8,7 @@ use super::heights::{Heights, Lift};
 use super::layout::{Layout, Setup, Target};
 use super::parts::where_it_differs;
 use super::path::{Path, StartNear, Step, TouchStep};
-use super::plan::{PlanTouch, Skipped};
+use super::plan::{Find, PlanTouch, Skipped};
 use super::reach::Reached;
 use super::rotary_turns::{Turn, turn_step, turns};
 use super::scene::Scene;
@@ -44,7 +44,15 @@ pub(super) struct Routed {
 ///
 /// # Errors
 /// When no program can begin on this machine: no axis lifts the probe, or not even near the first pose all is clear.
-pub(super) fn route(scenes: &[Scene], layout: &Layout, spec: &ProgramSpec, tcp: bool) -> Result<Routed> {
+///
+/// `finding`: the scene while the artefact is not found yet, where it was put down by eye, and the touches that find it.
+pub(super) fn route<'m>(
+    scenes: &[Scene<'m>],
+    finding: Option<(&Scene<'m>, &Find)>,
+    layout: &Layout,
+    spec: &ProgramSpec,
+    tcp: bool,
+) -> Result<Routed> {
     let Some(scene) = scenes.first() else { return Ok(Routed::default()) };
     let Some(lift) = scene.lift() else {
         return Err(Failure::new("program::no_lift", format!("{} has no linear axis", scene.machine.name))
@@ -77,11 +85,16 @@ pub(super) fn route(scenes: &[Scene], layout: &Layout, spec: &ProgramSpec, tcp: 
         stopped: false,
         met: BTreeSet::new(),
         heights: Heights { over_all: lift.top_height(), over_blocks: lift.top_height() },
+        shifted_at: None,
     };
+    if let Some((unfound, find)) = finding {
+        router.find(unfound, find)?;
+    }
     for setup in &layout.setups {
         router.setup(setup)?;
     }
     router.leave(tcp);
+    router.number_find_touches();
     router.out.path.seconds = router.clock.rounded_s();
     router.out.path.waiting = router.clock.waiting;
     if router.part > 0 {
@@ -116,6 +129,8 @@ pub(super) struct Router<'a, 'm> {
     pub(super) met: BTreeSet<usize>,
     /// Of the pose in which the machine stands.
     pub(super) heights: Heights,
+    /// The pose for which the moves are relative to what was found; `None`: nothing is to be found.
+    pub(super) shifted_at: Option<AxisMap>,
 }
 
 impl Router<'_, '_> {
@@ -179,7 +194,7 @@ impl Router<'_, '_> {
             Err(reason) => return Ok(Err(reason)),
         };
         let Some(at) = self.at else {
-            self.begin(setup, &turns, first)?;
+            self.begin(&setup.pose, &turns, &first.start)?;
             self.enter(setup);
             self.heights = heights;
             return Ok(Ok(()));
@@ -196,6 +211,7 @@ impl Router<'_, '_> {
                     for turn in &turns {
                         self.turn(turn);
                     }
+                    self.shift_for(&setup.pose);
                     let stopped = std::mem::take(&mut self.stopped);
                     self.visit += u32::from(stopped || !turns.is_empty());
                     self.heights = heights;
@@ -218,18 +234,21 @@ impl Router<'_, '_> {
             self.scene.clear_turn(&here, *axis, *to).map_err(|hit| format!("as {axis} turns to {to} {hit}"))?;
             here.set(*axis, *to);
         }
+        if self.shifted_at.is_some() {
+            self.scene.clear_box(&here, &here).map_err(|hit| format!("beside the artefact {hit}"))?;
+        }
         self.lateral(&here, &first.start).map(|_| ())
     }
 
     /// The first moves: nobody knows where the machine stands.
-    fn begin(&mut self, setup: &Setup, turns: &[Turn], first: &Reached) -> Result<()> {
+    pub(super) fn begin(&mut self, pose: &AxisMap, turns: &[Turn], start: &Position) -> Result<()> {
         let lift = self.lift;
         // whatever is mounted when a run starts again at a later set-up
         let all_clear = |window: &dyn Fn(&Axis) -> [f64; 2]| {
             self.scenes.iter().all(|scene| scene.clear_from_anywhere(&lift, window))
         };
         if !all_clear(&|a| a.range) {
-            let near = StartNear { pose: setup.pose, within_deg: self.overshoot_deg };
+            let near = StartNear { pose: *pose, within_deg: self.overshoot_deg };
             if !all_clear(&|a| near.window(a)) {
                 return Err(Failure::new(
                     "program::no_start",
@@ -251,7 +270,7 @@ impl Router<'_, '_> {
             self.turn(turn);
         }
         self.visit += 1;
-        let mut at = first.start;
+        let mut at = *start;
         at.set(lift.axis, lift.top);
         for axis in self.across() {
             self.clock.rapid(half(axis));
@@ -320,7 +339,7 @@ impl Router<'_, '_> {
     }
 
     /// From where the ball stands over to a touch's start: up, across, down.
-    fn travel(&mut self, start: &Position) -> Result<(), String> {
+    pub(super) fn travel(&mut self, start: &Position) -> Result<(), String> {
         let Some(at) = self.at else { return Err("the machine does not stand at a known place".to_owned()) };
         if at == *start {
             return Ok(());
@@ -473,7 +492,7 @@ impl Router<'_, '_> {
 }
 
 /// The linear axes of a position.
-fn linear(at: &Position) -> AxisMap {
+pub(super) fn linear(at: &Position) -> AxisMap {
     let p = at.xyz_mm();
     AxisMap::xyz(p.x, p.y, p.z)
 }

@@ -190,6 +190,30 @@ pub struct Scene<'m> {
     pub(super) carriers: Vec<Carrier>,
     /// By how much every gap may fall short of what is needed, mm.
     pub(super) slack_mm: f64,
+    /// What is mounted was put down by eye.
+    pub(super) by_eye: Option<ByEye>,
+}
+
+/// An artefact that was put down by eye, and a machine whose moves are relative to it once it is found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ByEye {
+    /// How far off it may stand, mm.
+    pub astray_mm: f64,
+    /// The moves are relative to it already.
+    pub found: bool,
+}
+
+impl ByEye {
+    /// What must be left free beside the room that an artefact at its place needs, mm. `at_rapid`: rapids and turns. A turn takes the
+    /// artefact along and not yet the tool: both may be off by as much, in opposite directions.
+    fn room_mm(&self, role: Role, at_rapid: bool) -> f64 {
+        match role {
+            Role::Fixed => self.astray_mm,
+            Role::Block(_) | Role::Mounted if at_rapid => 2.0 * self.astray_mm,
+            Role::Block(_) | Role::Mounted if self.found => 0.0,
+            Role::Block(_) | Role::Mounted => self.astray_mm,
+        }
+    }
 }
 
 /// Where the bodies of the machine are: the tool and each carrier of obstacles, in R.
@@ -204,6 +228,17 @@ impl<'m> Scene<'m> {
     #[must_use]
     pub fn rounded(self, slack_mm: f64) -> Self {
         Self { slack_mm, ..self }
+    }
+
+    /// The same for an artefact that was put down by eye.
+    #[must_use]
+    pub fn put_by_eye(self, by_eye: Option<ByEye>) -> Self {
+        Self { by_eye, ..self }
+    }
+
+    /// Room for where something stands that was put down by eye, mm.
+    pub(super) fn astray_mm(&self, role: Role, at_rapid: bool) -> f64 {
+        self.by_eye.map_or(0.0, |by_eye| by_eye.room_mm(role, at_rapid))
     }
 
     /// The solids of a machine with an artefact mounted.
@@ -227,7 +262,8 @@ impl<'m> Scene<'m> {
         parts.push((Part::Stem, Solid::cylinder(ball, up, probe.stem_radius, probe.stem_length)));
         parts.push((Part::Ball, Solid::ball(ball, probe.ball_radius)));
 
-        let mut scene = Self { machine, parts, obstacles: Vec::new(), carriers: vec![mounting.carrier], slack_mm: 0.0 };
+        let (obstacles, carriers) = (Vec::new(), vec![mounting.carrier]);
+        let mut scene = Self { machine, parts, obstacles, carriers, slack_mm: 0.0, by_eye: None };
         for (i, block) in mounting.blocks.iter().enumerate() {
             for solid in Solid::of_body(block) {
                 scene.add(format!("block {}", block.name), Role::Block(i), block.carrier, solid);

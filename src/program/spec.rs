@@ -3,6 +3,7 @@
 //! What only a machine can tell (does the mounting have this block, does the axis go there) is checked by `layout`.
 
 use super::as_written::{self as w, FacesIn, RingIn};
+use super::find::{MOST_ASTRAY_MM, is_placement_tolerance};
 use super::parts::{PartSpec, part_of};
 use crate::axes::{AxisMap, AxisName};
 use crate::diag::{Finding, Findings, Result, Source, from_toml};
@@ -171,6 +172,8 @@ pub struct ProgramSpec {
     pub faces_in: FacesIn,
     /// How far a rotary axis goes past a pose that it must come to from the other side.
     pub overshoot_deg: f64,
+    /// The artefact is put down by eye within this, and found by the first touches.
+    pub placement_tolerance_mm: Option<f64>,
     /// The set-ups, in order; lists of angles are spread out.
     pub setups: Vec<SetupSpec>,
     /// The file, for messages.
@@ -245,6 +248,15 @@ impl Check<'_> {
                 "write an angle above 0 and up to 90",
             );
         }
+        let placement_tolerance_mm = f.placement_tolerance.as_ref().map(|mm| *mm.get_ref());
+        if let Some(mm) = f.placement_tolerance.as_ref().filter(|mm| !is_placement_tolerance(*mm.get_ref())) {
+            self.error(
+                mm.span(),
+                "program::placement_tolerance",
+                format!("placement_tolerance is {} mm", Plain(*mm.get_ref())),
+                format!("write how far off the artefact may stand, more than 0 and up to {MOST_ASTRAY_MM} mm"),
+            );
+        }
         let named = Named { grids: self.grids(&f.grid), rings: self.rings(&f.ring, f.faces_in) };
         let repeats = self.repeats(f.repeats.as_ref()).unwrap_or(1);
         let (mut setups, mut parts) = (Vec::new(), Vec::new());
@@ -283,6 +295,7 @@ impl Check<'_> {
             parts,
             faces_in: f.faces_in,
             overshoot_deg,
+            placement_tolerance_mm,
             setups,
             source: self.source.clone(),
         }

@@ -91,6 +91,9 @@ impl Router<'_, '_> {
             at.set(axis, angle);
             steps.push(turn_step(axis, angle, sense));
         }
+        if self.shifted_at.is_some() {
+            steps.extend(self.shift_steps(&at)?);
+        }
         let mut rapids = self.lateral(&at, &to).ok()?;
         if (self.lift.height(&at) - self.lift.height(&to)).abs() > SAME {
             rapids.push(self.lift.axis);

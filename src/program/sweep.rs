@@ -83,7 +83,13 @@ impl Scene<'_> {
             }
             _ => Some(probe.clearance),
         };
-        needed.map(|mm| (mm - self.slack_mm).max(0.0))
+        // at its contact a search is relative to the block, wherever that stands
+        let at_contact = |b: usize| obstacle.role == Role::Block(b) && matches!(part, Part::Ball | Part::Stem);
+        let astray = match manner {
+            Manner::ToContact(b) | Manner::PastContact(b) if at_contact(b) => 0.0,
+            _ => self.astray_mm(obstacle.role, manner == Manner::Rapid),
+        };
+        needed.map(|mm| (mm + astray - self.slack_mm).max(0.0))
     }
 
     /// Proves a straight move of linear axes clear.

@@ -4,9 +4,12 @@
 //! believed to be clear. Every move is checked against limits and against collision over its whole length, every touch
 //! against the plan, every turn for its sense.
 
+mod find;
+
+use super::find::{farthest_mm, with_reserve};
 use super::path::{Path, Step, Stop, TouchStep};
 use super::plan::{Plan, PlanTouch};
-use super::scene::Scene;
+use super::scene::{ByEye, Scene};
 use super::sweep::Manner;
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::diag::{Failure, Result};
@@ -37,6 +40,11 @@ pub fn verify(machine: &Machine, plan: &Plan, path: &Path) -> Result<Vec<Violati
         Step::Stop(stop) => Some((&stop.mounting, stop.tool_length_mm, stop.ball_radius_mm)),
         _ => None,
     });
+    let inside = plan.find.as_ref().map(|find| with_reserve(machine, farthest_mm(find.tolerance_mm)));
+    let machine = inside.as_ref().unwrap_or(machine);
+    let by_eye = |found: bool| {
+        plan.find.as_ref().map(|find| ByEye { astray_mm: farthest_mm(find.tolerance_mm), found })
+    };
     let parts: Vec<(&String, f64, f64)> = std::iter::once(first).chain(stops).collect();
     let machines = parts.iter().map(|(_, length_mm, radius_mm)| {
         machine.with_stylus_of(*length_mm, *radius_mm).ok_or_else(|| {
@@ -49,15 +57,22 @@ pub fn verify(machine: &Machine, plan: &Plan, path: &Path) -> Result<Vec<Violati
         let mounting = machine
             .mounting(name)
             .ok_or_else(|| not_this_machine("program::unknown_mounting", &format!("mounting {name:?}"), machine))?;
-        let scene = Scene::new(with_stylus, mounting)?;
+        let scene = Scene::new(with_stylus, mounting)?.put_by_eye(by_eye(true));
         scene.blocks_clear_of_each_other().map(|()| scene)
     });
-    let scenes: Vec<Scene> = scenes.collect::<Result<_>>()?;
-    let Some(scene) = scenes.first() else { return Ok(Vec::new()) };
+    let mut scenes: Vec<Scene> = scenes.collect::<Result<_>>()?;
+    // the last one: before the artefact is found
+    if let (Some(_), Some(first)) = (&plan.find, machines.first())
+        && let Some(mounting) = machine.mounting(&plan.mounting)
+    {
+        scenes.push(Scene::new(first, mounting)?.put_by_eye(by_eye(false)));
+    }
+    let part = if plan.find.is_some() { scenes.len() - 1 } else { 0 };
+    let Some(scene) = scenes.get(part) else { return Ok(Vec::new()) };
     let mut walk = Walk {
         scenes: &scenes,
         scene,
-        part: 0,
+        part,
         mounted: &plan.mounting,
         part_began: 0,
         plan,
@@ -66,6 +81,8 @@ pub fn verify(machine: &Machine, plan: &Plan, path: &Path) -> Result<Vec<Violati
         in_contact: None,
         at_start_of: None,
         next_touch: 0,
+        find_touches: 0,
+        found: false,
         setups: 0,
         moves: Vec::new(),
         violations: Vec::new(),
@@ -143,6 +160,10 @@ struct Walk<'a, 'm> {
     /// Start of the touch at which the ball stands and from which it may search.
     at_start_of: Option<AxisMap>,
     next_touch: usize,
+    /// Touches that find the artefact, made so far.
+    find_touches: usize,
+    /// The artefact is found.
+    found: bool,
     /// That have begun.
     setups: u32,
     moves: Vec<Move>,
@@ -181,7 +202,7 @@ impl<'a> Walk<'a, '_> {
     }
 
     fn step(&mut self, i: usize, step: &'a Step) {
-        let moves = !matches!(step, Step::Note(_) | Step::Setup { .. });
+        let moves = !matches!(step, Step::Note(_) | Step::Setup { .. } | Step::Found { .. } | Step::Shift { .. });
         if moves && self.in_contact.is_some() && !matches!(step, Step::Retract { .. }) {
             self.violation(i, "the ball may still press against the block: a retract must come first".to_owned());
             self.in_contact = None;
@@ -195,6 +216,10 @@ impl<'a> Walk<'a, '_> {
             Step::Protected { to, feed } => self.linear(i, to, Some(*feed)),
             Step::Rotary { to, sense } => self.rotary(i, to, sense),
             Step::Touch(touch) => self.touch(i, touch),
+            Step::Find(touch) => self.find(i, touch),
+            Step::Found { .. } => {}
+            Step::Shift { matrix } => self.shift(i, matrix),
+            Step::FindEnd => self.found(i),
             Step::Retract { to, feed } => self.retract(i, to, *feed),
         }
     }
@@ -218,7 +243,7 @@ impl<'a> Walk<'a, '_> {
         (self.at, self.senses) = opening;
         for step in resume {
             match step {
-                Step::Rapid { .. } | Step::Rotary { .. } => self.step(i, step),
+                Step::Rapid { .. } | Step::Rotary { .. } | Step::Shift { .. } => self.step(i, step),
                 _ => self
                     .violation(i, "the way to take the program up again holds more than rapids and turns".to_owned()),
             }

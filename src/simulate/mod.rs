@@ -14,6 +14,7 @@ mod chain;
 mod contact;
 pub mod control;
 mod errorless;
+mod find;
 mod noise;
 mod own;
 mod prepare;
@@ -63,6 +64,33 @@ pub fn run_with_progress(
     compensation: Option<&Compensation>,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<(Vec<RawTouch>, Findings)> {
+    run_program(machine, plan, scenario, compensation, progress).map(|(made, findings)| (made.touches, findings))
+}
+
+/// What a program made.
+#[derive(Debug, Clone)]
+pub struct Made {
+    /// The touches, in the plan's order.
+    pub touches: Vec<RawTouch>,
+    /// How far off its place an artefact stood that was put down by eye, as the program has found it, mm along X, Y and Z with all
+    /// rotary axes at 0.
+    pub found_mm: Option<[f64; 3]>,
+}
+
+/// The same with what the program has found.
+///
+/// # Errors
+/// As [`run`], and when the program stops because it does not find the artefact.
+pub fn run_program(
+    machine: &Machine,
+    plan: &Plan,
+    scenario: &Scenario,
+    compensation: Option<&Compensation>,
+    progress: &(dyn Fn(usize) + Sync),
+) -> Result<(Made, Findings)> {
+    let found = plan.find.as_ref().map(|sought| find::find(machine, plan, sought, scenario, compensation)).transpose()?;
+    let (found_mm, relative) = found.unzip();
+    let plan = relative.as_ref().unwrap_or(plan);
     /// Touches between two reports: some milliseconds of work.
     const CHUNK: usize = 1024;
     let (bench, findings) = prepare::bench(machine, plan, scenario, compensation)?;
@@ -79,7 +107,7 @@ pub fn run_with_progress(
         .into_iter()
         .for_each(|done| outcomes.extend(done));
     let findings = remarks(findings, &outcomes);
-    findings.finish(outcomes.into_iter().map(|o| o.raw).collect())
+    findings.finish(Made { touches: outcomes.into_iter().map(|o| o.raw).collect(), found_mm })
 }
 
 /// The first of many numbers, and how many more there are.

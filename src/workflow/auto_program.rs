@@ -61,6 +61,7 @@ pub fn auto_program(
     catalogue: &Catalogue,
     mounting: &Mounting,
     minutes: f64,
+    by_eye_mm: Option<f64>,
 ) -> Result<AutoProgram> {
     if !(minutes > 0.0 && minutes <= MOST_MINUTES) {
         return Err(Failure::new("auto::minutes", format!("--minutes {minutes}: more than 0, at most {MOST_MINUTES}"))
@@ -70,7 +71,12 @@ pub fn auto_program(
     let says = format!("chosen for {}: {minutes} minutes with {:?}", machine.name, mounting.name);
     let write = |pool: &[Bundle], choice: &Choice| {
         let head = Head { by: "generate --program auto", name: "auto", says: &says, again: &choice.again };
-        program_text(machine, mounting, &head, pool, &choice.chosen)
+        let text = program_text(machine, mounting, &head, pool, &choice.chosen);
+        match by_eye_mm {
+            // a key of the whole file: before its first table
+            Some(mm) => text.replacen("faces_in", &format!("placement_tolerance = {mm:?}\nfaces_in"), 1),
+            None => text,
+        }
     };
     let mut pool = bundles(machine, mounting, &SWIVELS_WIDE_DEG);
     let mut scale = 1.0;

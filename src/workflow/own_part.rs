@@ -154,6 +154,7 @@ pub fn convert(
         ball_radius_mm,
         tool_length_mm: request.tool_length_mm,
         placement_tolerance_mm: None,
+        find: None,
         blocks: vec![body(&points, &zero, request.carrier)],
         touches,
         skipped: Vec::new(),

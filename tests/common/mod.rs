@@ -41,7 +41,7 @@ pub fn with_artefact(machine: &str, artefact: &str, minutes: f64) -> (Machine, A
     let machines = source("machines.toml", axiscal::machine::BUILT_IN);
     let (mounted, _) = artefact::mount(&machines, &self::machine(machine), &source("artefact.toml", *text)).unwrap();
     let mounting = mounted.machine.mounting(artefact).unwrap();
-    let auto = auto_program(&mounted.machine, &Catalogue::built_in().unwrap(), mounting, minutes).unwrap();
+    let auto = auto_program(&mounted.machine, &Catalogue::built_in().unwrap(), mounting, minutes, None).unwrap();
     (mounted.machine.clone(), auto)
 }
 

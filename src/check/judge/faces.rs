@@ -164,6 +164,14 @@ impl Walk<'_, '_> {
         const ROUNDED_MM: f64 = 0.01;
         let probe = &self.case.machine.probe;
         let (overtravel, tolerance) = (probe.overtravel, probe.placement_tolerance);
+        if let Some(room_mm) = self.finding_mm {
+            // the artefact may stand anywhere within it: that a dead probe is not pushed cannot be had, that it is met slowly can
+            if past_mm > 2.0 * room_mm + 1.0 || feed > probe.slow_feed + self.case.same {
+                let says = format!("a search that finds the artefact ends {past_mm:.3} mm past it, at {} mm/min", Plain(feed));
+                self.say("check::overtravel", at, says, "no further than where it may stand, at slow_feed");
+            }
+            return;
+        }
         if past_mm + tolerance > overtravel + ROUNDED_MM + self.case.same {
             let says = format!(
                 "the search ends {past_mm:.3} mm past the face: a probe that does not answer would be pushed past its overtravel \

@@ -3,7 +3,6 @@
 use super::Writer;
 use crate::post::SideFile;
 use crate::post::spelling::name_of;
-use crate::program::path::Step;
 use std::fmt::Write as _;
 
 impl Writer<'_> {
@@ -50,7 +49,7 @@ impl Writer<'_> {
     fn touch_ranges(&self) -> Vec<(u64, u64, &str)> {
         let mut ranges: Vec<(u64, u64, &str)> = Vec::new();
         for step in &self.path.steps {
-            let Step::Touch(touch) = step else { continue };
+            let Some(touch) = step.touch() else { continue };
             match ranges.last_mut() {
                 Some((_, last, says)) if *says == touch.says && *last + 1 == touch.id => *last = touch.id,
                 _ => ranges.push((touch.id, touch.id, &touch.says)),

@@ -15,7 +15,7 @@ const SAME: f64 = 1e-6;
 pub(super) fn faces(path: &Path) -> Vec<&str> {
     let mut faces: Vec<&str> = Vec::new();
     for step in &path.steps {
-        if let Step::Touch(touch) = step
+        if let Some(touch) = step.touch()
             && !faces.contains(&touch.says.as_str())
         {
             faces.push(&touch.says);
@@ -124,10 +124,10 @@ impl Writer<'_> {
         let other = |what: &str| Err(self.broken(format!("not every {what} is that of the machine")));
         for step in &self.path.steps {
             match step {
-                Step::Touch(t) if (t.tolerance_mm - probe.placement_tolerance).abs() > SAME => {
+                Step::Touch(t) | Step::Find(t) if (t.tolerance_mm - probe.placement_tolerance).abs() > SAME => {
                     return other("tolerance");
                 }
-                Step::Touch(t) if (t.back_off_mm - probe.back_off).abs() > SAME => return other("back_off"),
+                Step::Touch(t) | Step::Find(t) if (t.back_off_mm - probe.back_off).abs() > SAME => return other("back_off"),
                 Step::Protected { feed, .. } | Step::Retract { feed, .. }
                     if (feed - probe.position_feed).abs() > SAME =>
                 {

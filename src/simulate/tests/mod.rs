@@ -50,6 +50,7 @@ pub fn empty_plan(machine: &Machine, mounting: &str) -> Plan {
         ball_radius_mm: 3.0,
         tool_length_mm: machine.tool.length_mm,
         placement_tolerance_mm: None,
+        find: None,
         blocks: blocks.collect(),
         touches: Vec::new(),
         skipped: Vec::new(),

@@ -46,6 +46,7 @@ pub(super) fn runs(
             ball_radius_mm: 0.0,
             tool_length_mm: places.length_mm,
             placement_tolerance_mm: None,
+            find: None,
             blocks: blocks(places, &own, spheres),
             touches,
             skipped: Vec::new(),
