@@ -449,6 +449,7 @@ fn with_parts(
     });
     if against.plan.is_none() {
         program.waits_for_a_mounting(&told.whole.trunk, source).map_or(Ok(()), Err)?;
+        program.finds(&told.whole.trunk, source).map_or(Ok(()), Err)?;
     }
     let mut findings = judge.finish();
     findings.extend(told.beyond.map(|at| too_many(source, at)));

@@ -4,6 +4,7 @@ use super::code::{Code, Expr, Instruction};
 use super::run::Event;
 use super::vm::Happened;
 use crate::diag::{Failure, Finding, Source};
+use crate::log;
 use crate::post::{DialectName, TOOL_PLACE};
 use std::ops::Range;
 
@@ -25,6 +26,13 @@ pub fn transforms(dialect: DialectName, code: &Code, source: &Source) -> Option<
 pub fn waits(trunk: &[Happened], source: &Source) -> Option<Failure> {
     let says = "here the program waits, between two touches, for a person who mounts something else: what stands on the machine from then on only its plan says";
     Some(refuse(says, stop(trunk)?, source))
+}
+
+/// Refuses a program that finds its artefact: where its touches are expected only its plan says. `trunk`: its whole run.
+pub fn finds(trunk: &[Happened], source: &Source) -> Option<Failure> {
+    let found = trunk.iter().find(|h| matches!(&h.event, Event::Log(text) if log::says_found(text)))?;
+    let says = "the program finds an artefact that was put down by eye: how far off it may stand only its plan says";
+    Some(refuse(says, found.at.clone(), source))
 }
 
 /// Where a program goes over to the control's own transformation.

@@ -154,7 +154,7 @@ pub(super) fn touches(scene: &Scene<'_>, lift: &Lift, block: &Block, tolerance_m
                 scene.clear_straight(&start, &nominal, Manner::ToContact(block)).map_err(|hit| hit.to_string())
             })
             .and_then(|()| {
-                scene.clear_straight(&nominal, &end, Manner::PastContact(block)).map_err(|hit| hit.to_string())
+                scene.clear_straight(&nominal, &end, Manner::PastArtefact(block)).map_err(|hit| hit.to_string())
             });
         clear.map_err(|why| refuse(format!("{face}: {why}")))?;
         let linear = |at: &Position| {

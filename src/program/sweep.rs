@@ -29,6 +29,8 @@ pub enum Manner {
     /// The rest of a search, run only where this block stands farther off: everything else keeps its clearance. The
     /// block itself is then not where the scene has it; against its real place the probe stands as at contact.
     PastContact(usize),
+    /// The same of a search that finds the artefact: where the block stands farther off, all that is mounted with it does.
+    PastArtefact(usize),
 }
 
 /// Two things that come too near.
@@ -76,7 +78,8 @@ impl Scene<'_> {
         let needed = match (manner, obstacle.role) {
             (Manner::Rapid, Role::Block(_) | Role::Mounted) => Some(probe.clearance + probe.placement_tolerance),
             (Manner::ToContact(b), Role::Block(o)) if b == o && part == Part::Ball => None,
-            (Manner::PastContact(b), Role::Block(o)) if b == o => None,
+            (Manner::PastContact(b) | Manner::PastArtefact(b), Role::Block(o)) if b == o => None,
+            (Manner::PastArtefact(_), Role::Mounted) => None,
             // body and head trip nothing: no control stops them
             (_, Role::Block(_) | Role::Mounted) if matches!(part, Part::Head | Part::Body) => {
                 Some(probe.clearance + probe.placement_tolerance)
@@ -86,7 +89,7 @@ impl Scene<'_> {
         // at its contact a search is relative to the block, wherever that stands
         let at_contact = |b: usize| obstacle.role == Role::Block(b) && matches!(part, Part::Ball | Part::Stem);
         let astray = match manner {
-            Manner::ToContact(b) | Manner::PastContact(b) if at_contact(b) => 0.0,
+            Manner::ToContact(b) if at_contact(b) => 0.0,
             _ => self.astray_mm(obstacle.role, manner == Manner::Rapid),
         };
         needed.map(|mm| (mm + astray - self.slack_mm).max(0.0))

@@ -4,6 +4,7 @@
 mod any_machine;
 mod artefacts;
 mod beside_the_axis;
+mod by_eye;
 mod centres;
 mod check;
 mod check_branches;

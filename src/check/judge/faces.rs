@@ -142,7 +142,8 @@ impl Walk<'_, '_> {
         });
         if let Some(b) = scene_block {
             self.prove(at, part, *from, *reached, How::Straight(Manner::ToContact(b)));
-            self.prove(at, part, *reached, *to, How::Straight(Manner::PastContact(b)));
+            let past = if self.finding_mm.is_some() { Manner::PastArtefact(b) } else { Manner::PastContact(b) };
+            self.prove(at, part, *reached, *to, How::Straight(past));
         }
         self.search_is_gentle(at, probe.feed, (to.xyz_mm() - reached.xyz_mm()).norm());
         if !self.came_guarded {

@@ -32,6 +32,8 @@ impl How {
             Self::Straight(Manner::Guarded) => 1,
             Self::Straight(Manner::ToContact(b)) => 32 + (b % 64) as u8,
             Self::Straight(Manner::PastContact(b)) => 96 + (b % 64) as u8,
+            // one artefact is found
+            Self::Straight(Manner::PastArtefact(_)) => 160,
             Self::Spanned => 2,
             Self::Turn(axis) => 3 + axis.index() as u8,
         }

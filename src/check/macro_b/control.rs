@@ -536,7 +536,7 @@ impl Dialect for MacroB {
             Var::Number(1..=33) => {
                 self.own.last_mut().map(|own| own.insert(var.clone(), value));
             }
-            Var::Number(n) if self.builder.stopped_in == Some(*n) => {
+            Var::Number(n) if self.builder.common.contains(n) => {
                 self.common.insert(var.clone(), value);
             }
             _ => return Err(format!("{var} is not the program's own: only #1 to #33 are")),

@@ -22,8 +22,8 @@ pub struct Builder {
     orient: (f64, &'static str),
     /// Variable that is 1 while the probe is deflected.
     probe_input: Option<u32>,
-    /// Common variable in which the program keeps the touch at which it stopped.
-    pub stopped_in: Option<u32>,
+    /// Common variables that the program writes over: the touch at which it stopped, and where it has found the artefact.
+    pub common: Vec<u32>,
     /// What does not fit into a field of the log is not written.
     pub cuts: bool,
 }
@@ -48,7 +48,10 @@ impl Builder {
             wait_word: words.first().cloned().unwrap_or_default(),
             orient: orient.unwrap_or((19.0, "R")),
             probe_input: setting("probe_input").trim().strip_prefix('#').and_then(|n| n.parse().ok()),
-            stopped_in: setting("stopped_in").trim().strip_prefix('#').and_then(|n| n.parse().ok()),
+            common: ["stopped_in", "found_x", "found_y", "found_z", "found_off", "found_room"]
+                .into_iter()
+                .filter_map(|name| setting(name).trim().strip_prefix('#')?.parse().ok())
+                .collect(),
             cuts: post.check.as_ref().is_some_and(|c| c.field_overflow == Overflow::Cut),
         }
     }

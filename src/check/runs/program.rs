@@ -120,6 +120,11 @@ impl Program {
         needs_plan::waits(trunk, source)
     }
 
+    /// Where it finds an artefact: it cannot be judged without its plan.
+    pub fn finds(&self, trunk: &[Happened], source: &Source) -> Option<Failure> {
+        needs_plan::finds(trunk, source)
+    }
+
     /// The set-up at which it is told to begin.
     pub fn begins_at(&self) -> Option<u32> {
         let (_, at) = self.from.as_ref()?;

@@ -16,6 +16,7 @@ use crate::machine::Machine;
 use crate::post::Postprocessor;
 use crate::units::mm_from_inch;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// A full turn, deg.
 const TURN: f64 = 360.0;
@@ -51,6 +52,8 @@ pub struct Sinumerik {
     modulo: [bool; 6],
     /// Machine coordinates at the origin of R.
     origin: Position,
+    /// R parameters that the postprocessor file gives to the program: nothing of the user's is in them.
+    found_in: Arc<[Var]>,
     inch: bool,
     incremental: bool,
     plane: f64,
@@ -375,6 +378,9 @@ impl Dialect for Sinumerik {
                 .collect(),
             modulo,
             origin: machine.origin.position(),
+            found_in: ["found_x", "found_y", "found_z", "found_off", "found_room"]
+                .map(|name| Var::Name(Arc::from(setting(name).trim())))
+                .into(),
             inch: awkward,
             incremental: awkward,
             plane: if awkward {
@@ -565,7 +571,7 @@ impl Dialect for Sinumerik {
     fn settings(&self) -> BTreeMap<String, String> {
         let is_r = |v: &Var| matches!(v, Var::Name(n) if n.strip_prefix('R').is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit())));
         let written: Vec<String> =
-            self.own.iter().filter(|(v, _)| is_r(v)).map(|(v, x)| format!("{v}={x:.6}")).collect();
+            self.own.iter().filter(|(v, _)| is_r(v) && !self.found_in.iter().any(|own| own == v)).map(|(v, x)| format!("{v}={x:.6}")).collect();
         BTreeMap::from([("R parameters".to_owned(), written.join(" "))])
     }
 

@@ -28,7 +28,7 @@ impl<'a> Walk<'a, '_> {
             self.violation(i, format!("{}: it must search slowly", touch.says));
         }
         self.prove(i, at, nominal, How::Straight(Manner::ToContact(0)));
-        self.prove(i, nominal, end, How::Straight(Manner::PastContact(0)));
+        self.prove(i, nominal, end, How::Straight(Manner::PastArtefact(0)));
         self.inside(i, &touch.end);
         self.in_contact = Some(touch.start);
     }
