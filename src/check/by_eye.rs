@@ -28,9 +28,8 @@ pub fn displaced(machine: &Machine, plan: &Plan, parts: Vec<Part>, off_mm: &Vect
         part.machine = with_reserve(&part.machine, reserve);
         let length = machine.tool.length_mm;
         let Some(block) = part.mounting.blocks.iter().find(|b| b.name == find.block) else { return part };
-        let ball = |linear: Vector3<f64>| {
-            machine.ball_in(block.carrier, &Position::default().with_xyz_mm(linear), length)
-        };
+        let ball =
+            |linear: Vector3<f64>| machine.ball_in(block.carrier, &Position::default().with_xyz_mm(linear), length);
         let off = ball(*off_mm) - ball(Vector3::zeros());
         part.mounting.blocks.iter_mut().for_each(|b| b.centre += off);
         for solid in &mut part.mounting.solids {
@@ -46,7 +45,8 @@ pub fn displaced(machine: &Machine, plan: &Plan, parts: Vec<Part>, off_mm: &Vect
 
 /// Adds what is wrong with the artefact somewhere else.
 pub fn add(checked: &mut Checked, there: Checked, off_mm: &Vector3<f64>) {
-    let [x, y, z] = [off_mm.x, off_mm.y, off_mm.z].map(|mm| format!("{}{}", if mm < 0.0 { "" } else { "+" }, Plain(mm)));
+    let [x, y, z] =
+        [off_mm.x, off_mm.y, off_mm.z].map(|mm| format!("{}{}", if mm < 0.0 { "" } else { "+" }, Plain(mm)));
     let says = format!("with the artefact off by X{x} Y{y} Z{z} mm");
     let errors = there.findings.into_iter().filter(|f| f.severity == crate::diag::Severity::Error);
     checked.findings.extend(errors.map(|f| Finding { message: format!("{says}: {}", f.message), ..f }));

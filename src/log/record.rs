@@ -195,7 +195,8 @@ fn touch(line: &[u8], mut rest: &[u8], line_number: usize, rule: &LogRule) -> Re
 fn found(line: &[u8], mut rest: &[u8], rule: &LogRule) -> Result<[f64; 3], Fault> {
     let mut off = [0.0; 3];
     let mut sum = 0.0;
-    let cut = |what: &str| Fault::at(line, &line[line.len()..], 1, "log::cut_line", format!("the line ends without {what}"));
+    let cut =
+        |what: &str| Fault::at(line, &line[line.len()..], 1, "log::cut_line", format!("the line ends without {what}"));
     let mut word = |letter: u8| -> Result<f64, Fault> {
         rest = blanks(rest);
         let Some((_, after)) = rest.split_first().filter(|(first, _)| **first == letter) else {
@@ -217,7 +218,11 @@ fn found(line: &[u8], mut rest: &[u8], rule: &LogRule) -> Result<[f64; 3], Fault
             return Err(Fault::at(line, line, line.len(), "log::sum", message));
         }
     }
-    if blanks(rest).is_empty() { Ok(off) } else { Err(Fault::at(line, rest, 1, "log::unknown_word", format!("unknown word {}", show(rest)))) }
+    if blanks(rest).is_empty() {
+        Ok(off)
+    } else {
+        Err(Fault::at(line, rest, 1, "log::unknown_word", format!("unknown word {}", show(rest))))
+    }
 }
 
 /// Is a line of the log that which says where an artefact was found?

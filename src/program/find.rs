@@ -95,7 +95,10 @@ pub(super) fn sphere(mounting: &Mounting) -> Result<&Block> {
         [one] if one.form == Form::Sphere => Ok(one),
         _ => Err(Failure::new(
             "program::find",
-            format!("placement_tolerance: mounting {:?} is not one sphere, and only that is found by touches", mounting.name),
+            format!(
+                "placement_tolerance: mounting {:?} is not one sphere, and only that is found by touches",
+                mounting.name
+            ),
         )
         .help("place it within the tolerance of the machine, or take placement_tolerance out")),
     }
@@ -126,7 +129,9 @@ pub(super) fn touches(scene: &Scene<'_>, lift: &Lift, block: &Block, tolerance_m
     let square = Matrix3::from_fn(|i, j| ways.get(j).map_or(up, |w| *w)[i]);
     let is_square = (square.transpose() * square - Matrix3::identity()).norm() < 1e-6;
     if !is_square || (up - machine.tool.direction.into_inner()).norm() > 1e-6 {
-        return Err(refuse("with all rotary axes at 0 the spindle and X, Y, Z are not square to each other".to_owned()));
+        return Err(refuse(
+            "with all rotary axes at 0 the spindle and X, Y, Z are not square to each other".to_owned(),
+        ));
     }
     let rho = block.diameter.unwrap_or_default() / 2.0 + machine.probe.ball_radius;
     if rho < 2.0 * tolerance_mm {

@@ -177,7 +177,8 @@ fn finding<'m>(
     options: &Options,
     tolerance_mm: f64,
 ) -> Result<(scene::Scene<'m>, plan::Find)> {
-    let refuse = |why: &str, help: &str| Failure::new("program::find", format!("placement_tolerance: {why}")).help(help);
+    let refuse =
+        |why: &str, help: &str| Failure::new("program::find", format!("placement_tolerance: {why}")).help(help);
     if options.tcp {
         let why = "under the control's own transformation an artefact is not found by touches";
         return Err(refuse(why, "generate without --tcp, or place it within the tolerance of the machine"));

@@ -27,8 +27,11 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
     let faces = all().any(|b| matches!(b.form, Form::Box | Form::Plane));
     let body = if all().all(|b| b.form == Form::Box) { "block" } else { "body" };
     let tolerance = probe.placement_tolerance;
+    let by_eye = spec.placement_tolerance_mm.filter(|mm| *mm > tolerance);
     lines.extend([
-        if faces {
+        if let Some(mm) = by_eye {
+            format!("  what is touched within {mm} mm of its position along X, Y and Z: the first touches find it")
+        } else if faces {
             format!("  each block within {tolerance} mm of its position, its faces along the machine's axes")
         } else {
             format!("  what is touched within {tolerance} mm of its position")
@@ -38,6 +41,12 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
         "Before the start:".to_owned(),
         "  probe in the spindle, spindle stopped, nothing that touches the stylus".to_owned(),
     ]);
+    if let Some(mm) = by_eye {
+        let [too_far, bears] = [past_mm(routed) + mm, probe.overtravel];
+        lines.push(format!(
+            "  deflect the stylus by hand: the control must show it. A dead probe would be pushed by up to {too_far:.1} mm, it bears {bears} mm"
+        ));
+    }
     lines.extend(sense_lines(machine, layout));
     if !routed.skipped.is_empty() {
         lines.push(match routed.skipped.len() {
@@ -68,6 +77,13 @@ pub(super) fn head(machine: &Machine, spec: &ProgramSpec, layout: &Layout, route
     }
     lines.retain(|l| !l.trim().is_empty());
     lines
+}
+
+/// How far the first search is programmed to go past the nominal contact, mm.
+fn past_mm(routed: &Routed) -> f64 {
+    let way =
+        |touch: &super::path::TouchStep| (touch.end.position().xyz_mm() - touch.nominal.position().xyz_mm()).norm();
+    routed.path.steps.iter().find_map(|step| step.touch().map(way)).unwrap_or(0.0)
 }
 
 /// What is to be put up: at the start and, where the program has several parts, at each stop.

@@ -108,9 +108,7 @@ fn relative_to(machine: &Machine, plan: &Plan, found: Vec3) -> Plan {
         let links = chain.links_to(carrier);
         let stylus = Stylus { length_mm: touch.tool_length_mm.unwrap_or(length_mm), spindle_deg: 0.0 };
         let ball = |at: &Position| chain.ball_in(at, &nothing, links, stylus);
-        let at = |xyz: Vec3, pose: &Position| {
-            Position([xyz[0], xyz[1], xyz[2], pose.0[3], pose.0[4], pose.0[5]])
-        };
+        let at = |xyz: Vec3, pose: &Position| Position([xyz[0], xyz[1], xyz[2], pose.0[3], pose.0[4], pose.0[5]]);
         let (level, pose) = (Position::default(), touch.pose.position());
         // where the artefact is, in what bears it
         let moved = minus(ball(&at(found, &level)), ball(&level));

@@ -88,7 +88,8 @@ pub fn run_program(
     compensation: Option<&Compensation>,
     progress: &(dyn Fn(usize) + Sync),
 ) -> Result<(Made, Findings)> {
-    let found = plan.find.as_ref().map(|sought| find::find(machine, plan, sought, scenario, compensation)).transpose()?;
+    let found =
+        plan.find.as_ref().map(|sought| find::find(machine, plan, sought, scenario, compensation)).transpose()?;
     let (found_mm, relative) = found.unzip();
     let plan = relative.as_ref().unwrap_or(plan);
     /// Touches between two reports: some milliseconds of work.

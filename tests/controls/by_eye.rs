@@ -61,7 +61,10 @@ fn a_sphere_put_down_by_eye_goes_round_on_every_control() {
             for (name, truth) in PLANTED {
                 let p = fit["parameters"].as_array().unwrap().iter().find(|p| p["name"] == name).unwrap();
                 let (value, sigma) = (p["value"].as_f64().unwrap(), p["sigma"].as_f64().unwrap());
-                assert!((value - truth).abs() < 4.0 * sigma, "{controller}: {name}: {value} for {truth}, sigma {sigma}");
+                assert!(
+                    (value - truth).abs() < 4.0 * sigma,
+                    "{controller}: {name}: {value} for {truth}, sigma {sigma}"
+                );
             }
             let rms = fit["rms_um"].as_f64().unwrap();
             assert!(rms < 1.3, "{controller}: {rms} um left of 0.5 um each touch and each visit");

@@ -72,16 +72,35 @@ fn rs274_drives_every_search_to_the_plans_end() {
 
 // ------------------------------------------------------------------------------------- literal motion, read by others
 
-/// A program for the paper's machine: its plan, its text.
+/// The program of a sphere that was put down by eye.
+const BY_EYE: &str = "by-eye";
+
+/// Two programs for the paper's machine, and one that finds its artefact.
+const PROGRAMS: [&str; 3] = ["head", "table", BY_EYE];
+
+/// A program: its plan, its text.
 fn written(controller: &str, program: &str) -> (Generated, String) {
-    let (machines, _) = machine::load(&source("machines", machine::BUILT_IN)).unwrap();
-    let machine = machines.into_iter().find(|m| m.name == "swivel-head").unwrap();
     let (post, _) = Postprocessor::load_built_in_or_file(controller).unwrap();
-    let spec = program::choose(program::built_in().unwrap(), program, &machine).unwrap();
+    let (machine, spec) = if program == BY_EYE {
+        let (machine, auto) = crate::common::with_artefact("trunnion", "sphere", 5.0);
+        (machine, program::ProgramSpec { placement_tolerance_mm: Some(3.0), ..auto.spec })
+    } else {
+        let (machines, _) = machine::load(&source("machines", machine::BUILT_IN)).unwrap();
+        let machine = machines.into_iter().find(|m| m.name == "swivel-head").unwrap();
+        let spec = program::choose(program::built_in().unwrap(), program, &machine).unwrap();
+        (machine, spec)
+    };
     let (generated, _) = program::generate(&machine, &spec, &Options::default()).unwrap();
     let text = post.program(&machine, &generated.plan, &generated.path).unwrap().text;
-    let text = text.lines().map(unrolled).collect();
+    let text = text.lines().map(in_its_place).map(|line| unrolled(&line)).collect();
     (generated, text)
+}
+
+/// A move with the artefact in its place: what it adds to its numbers is 0 then.
+fn in_its_place(line: &str) -> String {
+    let is_move = line.starts_with("G0 ") && ["+#14", "+R9"].iter().any(|added| line.contains(added));
+    let word = |word: &str| word.split_once('+').map_or(word, |(number, _)| number).replace('[', "");
+    if is_move { line.split(' ').map(word).collect::<Vec<_>>().join(" ") } else { line.to_owned() }
 }
 
 /// A call with the moves that it makes between contacts: what the routine does with its numbers is the business of others.
@@ -131,6 +150,12 @@ fn makes_every_touch(who: &str, generated: &Generated, moves: &[Move], same: f64
         })
     };
     let mut searches = moves.iter().filter(|(probing, ..)| *probing);
+    let finds = generated.plan.find.iter().flat_map(|find| &find.touches).zip(1..);
+    for (touch, number) in finds {
+        let (start, end) = (touch.start.position(), touch.end.position());
+        let found = searches.by_ref().find(|(_, from, to)| near(from, &start, true) && near(to, &end, true));
+        assert!(found.is_some(), "{who}: find touch {number} is not searched from {start:?} to {end:?}");
+    }
     for touch in &generated.plan.touches {
         let (start, end) = (touch.start_position(), touch.end_position());
         let found = searches.by_ref().find(|(_, from, to)| near(from, &start, true) && near(to, &end, true));
@@ -139,7 +164,8 @@ fn makes_every_touch(who: &str, generated: &Generated, moves: &[Move], same: f64
         assert!(measured, "{who}: touch {} is not measured to {end:?}", touch.id);
     }
     // nothing is probed at an angle that the plan lacks
-    let poses: Vec<Position> = generated.plan.touches.iter().map(|t| t.start_position()).collect();
+    let level = generated.plan.find.iter().map(|_| Position::default());
+    let poses: Vec<Position> = generated.plan.touches.iter().map(|t| t.start_position()).chain(level).collect();
     let probing_elsewhere = moves.iter().find(|(probing, _, to)| *probing && !poses.iter().any(|p| near(to, p, false)));
     assert!(probing_elsewhere.is_none(), "{who}: it probes at a pose that the plan lacks: {probing_elsewhere:?}");
 }
@@ -159,7 +185,7 @@ fn literal_macro_b(text: &str) -> String {
 #[test]
 fn the_gcode_crate_reads_the_motion_of_fanuc_and_haas() {
     for controller in ["fanuc", "haas"] {
-        for program in ["head", "table"] {
+        for program in PROGRAMS {
             let (generated, text) = written(controller, program);
             let literal = literal_macro_b(&text);
             let read = gcode::parse(&literal).unwrap_or_else(|e| panic!("{controller}: {e:?}"));
@@ -215,7 +241,7 @@ fn nc_gcode_interpreter_reads_the_motion_of_sinumerik() {
         println!("left out: nc-gcode-interpreter is not installed (tests/readers/install.sh)");
         return;
     };
-    for program in ["head", "table"] {
+    for program in PROGRAMS {
         let (generated, text) = written("sinumerik", program);
         let (literal, probing) = literal_sinumerik(&text);
         let mut reader = Command::new(&python)

@@ -214,7 +214,8 @@ impl Job {
             &std::fs::read_to_string(self.dir.join(format!("{program}.plan.json"))).map_err(|e| e.to_string())?,
         )
         .map_err(|e| e.to_string())?;
-        let n_touches = plan["touches"].as_array().map_or(0, Vec::len) as u64;
+        let finds = plan["find"]["touches"].as_array().map_or(0, Vec::len);
+        let n_touches = (plan["touches"].as_array().map_or(0, Vec::len) + finds) as u64;
         for (what, expected) in
             [("block_touches", 2 * n_touches), ("solid_touches", 0), ("stem_touches", 0), ("collisions", 0)]
         {

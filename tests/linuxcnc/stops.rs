@@ -150,6 +150,7 @@ pub fn rs274_accepts_every_program() {
         ("swivel-table-b", "full", &[]),
         ("nutating-b", "full", &[]),
         ("trunnion-offset", "full", &[]),
+        ("trunnion", "auto", &["--artefact", "sphere", "--minutes", "5", "--placement-tolerance", "3"]),
     ];
     for (machine, program, more) in programs {
         let (folder, text) = generate(machine, program, more);

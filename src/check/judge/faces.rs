@@ -168,7 +168,8 @@ impl Walk<'_, '_> {
         if let Some(room_mm) = self.finding_mm {
             // the artefact may stand anywhere within it: that a dead probe is not pushed cannot be had, that it is met slowly can
             if past_mm > 2.0 * room_mm + 1.0 || feed > probe.slow_feed + self.case.same {
-                let says = format!("a search that finds the artefact ends {past_mm:.3} mm past it, at {} mm/min", Plain(feed));
+                let says =
+                    format!("a search that finds the artefact ends {past_mm:.3} mm past it, at {} mm/min", Plain(feed));
                 self.say("check::overtravel", at, says, "no further than where it may stand, at slow_feed");
             }
             return;

@@ -25,7 +25,8 @@ impl Writer<'_> {
         if self.post.finds() {
             return Ok(());
         }
-        let says = format!("controller {} does not say how an artefact is found that was put down by eye", self.post.name);
+        let says =
+            format!("controller {} does not say how an artefact is found that was put down by eye", self.post.name);
         Err(Failure::new("post::find", says).help(
             "generate without placement_tolerance, or describe it under [write.found], [write.shift] and [write.find_end]",
         ))
@@ -56,9 +57,8 @@ impl Writer<'_> {
         const NOTHING: f64 = 5e-7;
         let row = |(i, axis): (usize, &AxisName)| {
             let terms = LINEAR.iter().enumerate().filter(|(j, _)| matrix[(i, *j)].abs() > NOTHING);
-            let terms: Vec<Value> = terms
-                .map(|(j, a)| context! { axis => a.to_string(), value => self.fine(matrix[(i, j)]) })
-                .collect();
+            let terms: Vec<Value> =
+                terms.map(|(j, a)| context! { axis => a.to_string(), value => self.fine(matrix[(i, j)]) }).collect();
             context! { axis => axis.to_string(), terms }
         };
         Value::from(LINEAR.iter().enumerate().map(row).collect::<Vec<Value>>())
@@ -66,7 +66,8 @@ impl Writer<'_> {
 
     pub(super) fn find_end(&mut self) -> Result<()> {
         let tolerance = self.plan.find.as_ref().map_or(0.0, |find| find.tolerance_mm);
-        let context = context! { most => self.length(tolerance + ROUNDED_MM), find_tolerance => self.length(tolerance) };
+        let context =
+            context! { most => self.length(tolerance + ROUNDED_MM), find_tolerance => self.length(tolerance) };
         self.render("find_end", context)
     }
 }

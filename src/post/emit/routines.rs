@@ -127,7 +127,9 @@ impl Writer<'_> {
                 Step::Touch(t) | Step::Find(t) if (t.tolerance_mm - probe.placement_tolerance).abs() > SAME => {
                     return other("tolerance");
                 }
-                Step::Touch(t) | Step::Find(t) if (t.back_off_mm - probe.back_off).abs() > SAME => return other("back_off"),
+                Step::Touch(t) | Step::Find(t) if (t.back_off_mm - probe.back_off).abs() > SAME => {
+                    return other("back_off");
+                }
                 Step::Protected { feed, .. } | Step::Retract { feed, .. }
                     if (feed - probe.position_feed).abs() > SAME =>
                 {

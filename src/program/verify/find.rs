@@ -12,7 +12,10 @@ impl<'a> Walk<'a, '_> {
         let planned = self.plan.find.as_ref().and_then(|find| find.touches.get(self.find_touches));
         self.find_touches += 1;
         let (Some(planned), Some(at)) = (planned, self.known()) else {
-            self.violation(i, "a touch that finds the artefact is not in the plan, or begins at an unknown place".into());
+            self.violation(
+                i,
+                "a touch that finds the artefact is not in the plan, or begins at an unknown place".into(),
+            );
             return;
         };
         let [start, nominal, end] = [touch.start, touch.nominal, touch.end].map(|m| m.or(&touch.pose).position());
