@@ -209,6 +209,7 @@ fn plan(machine: &Machine, blocks: Vec<PlanBlock>, n_touches: usize, rng: &mut C
         ball_radius_mm: machine.probe.ball_radius,
         tool_length_mm: length_mm,
         placement_tolerance_mm: None,
+        find: None,
         blocks_anew: false,
         blocks,
         touches,

@@ -179,12 +179,15 @@ fn summary(plan: &Plan, read: &MatchedLog) -> String {
             column.set_cell_alignment(CellAlignment::Right);
         }
     }
+    let found = plan.find.as_ref().and(read.found_mm).map_or_else(String::new, |off| {
+        format!("\nthe artefact was found off its position by X {:+.3} Y {:+.3} Z {:+.3} mm", off.x, off.y, off.z)
+    });
     let done = read.touches.iter().filter(|t| t.status != Status::Elsewhere).count();
     let planned = plan.touches.len();
     let lacks =
         if done < planned { format!(" ({} NOT READ: the warnings say why)", planned - done) } else { String::new() };
     format!(
-        "{table}\nprogram {} on {}: {done} of {planned} planned touches read{lacks}; {}",
+        "{table}\nprogram {} on {}: {done} of {planned} planned touches read{lacks}; {}{found}",
         plan.program,
         plan.machine,
         end_says(read)

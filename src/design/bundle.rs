@@ -348,13 +348,16 @@ pub fn cost_s(pool: &[Bundle], chosen: &[usize]) -> f64 {
 /// another.
 #[must_use]
 pub fn program_text(machine: &Machine, mounting: &Mounting, head: &Head, pool: &[Bundle], chosen: &[usize]) -> String {
-    let Head { by, name, says, again } = head;
+    let Head { by, name, says, again, by_eye_mm } = head;
     let mut text = format!(
         "# chosen by `axiscal {by}`\nformat = \"{FORMAT}\"\nname = \"{name}\"\nmachine = {}\nsays = {}\nmounting = {}\nfaces_in = \"block\"\n",
         toml_edit::value(&machine.name),
         toml_edit::value(*says),
         toml_edit::value(&mounting.name)
     );
+    if let Some(mm) = by_eye_mm {
+        let _ = writeln!(text, "placement_tolerance = {mm:?}");
+    }
     let mut shapes = Shapes::default();
     let mut body = String::new();
     let order = in_order(machine, pool, chosen);
@@ -399,6 +402,8 @@ pub struct Head<'a> {
     pub says: &'a str,
     /// Bundles that are touched once more at the end.
     pub again: &'a [usize],
+    /// The artefact is put down by eye within this.
+    pub by_eye_mm: Option<f64>,
 }
 
 /// Grids and rings of a program, each once.

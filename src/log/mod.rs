@@ -126,6 +126,12 @@ pub fn read_run(
     if let Writer::Controller(_) = writer {
         to_axes(machine, plan, &mut parsed.touches).map_err(|f| joined(&findings, f))?;
     }
+    if plan.find.is_some() && parsed.found_mm.is_none() && parsed.touches.iter().any(|t| t.id.is_none()) {
+        let says = "touches without numbers cannot be matched: the program found an artefact that was put down by eye, and this log does not say where";
+        let help = "use the log that the program itself writes";
+        findings.push(Finding::error("log::not_found", says).help(help));
+        return Err(Failure(findings.0));
+    }
     let found_mm = parsed.found_mm.or_else(|| found::by_touches(machine, plan, &parsed.touches));
     let relative = plan.find.as_ref().zip(found_mm).map(|(_, off)| plan.relative_to(machine, &off));
     let here = relative.as_ref().unwrap_or(plan);

@@ -70,15 +70,12 @@ pub fn auto_program(
     let budget_s = 60.0 * minutes;
     let says = format!("chosen for {}: {minutes} minutes with {:?}", machine.name, mounting.name);
     let write = |pool: &[Bundle], choice: &Choice| {
-        let head = Head { by: "generate --program auto", name: "auto", says: &says, again: &choice.again };
-        let text = program_text(machine, mounting, &head, pool, &choice.chosen);
-        match by_eye_mm {
-            // a key of the whole file: before its first table
-            Some(mm) => text.replacen("faces_in", &format!("placement_tolerance = {mm:?}\nfaces_in"), 1),
-            None => text,
-        }
+        let head = Head { by: "generate --program auto", name: "auto", says: &says, again: &choice.again, by_eye_mm };
+        program_text(machine, mounting, &head, pool, &choice.chosen)
     };
     let mut pool = bundles(machine, mounting, &SWIVELS_WIDE_DEG);
+    // what was found with one stylus is not found for another
+    pool.retain(|bundle| by_eye_mm.is_none() || bundle.manner.stylus.is_none());
     let mut scale = 1.0;
     let mut best: Option<(f64, String)> = None;
     let mut worst = f64::INFINITY;

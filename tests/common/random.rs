@@ -121,6 +121,7 @@ pub fn random_plan(machine: &Machine, mounting: &Mounting, n_touches: usize, rng
         ball_radius_mm: machine.probe.ball_radius,
         tool_length_mm: machine.tool.length_mm,
         placement_tolerance_mm: None,
+        find: None,
         blocks,
         touches,
         skipped: Vec::new(),

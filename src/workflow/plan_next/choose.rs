@@ -164,6 +164,14 @@ impl<'a> Setting<'a> {
         LinearisedPlan::with_effects(&self.task, &self.with(plan.clone(), label), &self.known, self.noise, effects)
     }
 
+    /// What stood there was put down by eye within this: a further program finds it as well.
+    fn by_eye_mm(&self, mounting: &Mounting) -> Option<f64> {
+        let is_on =
+            |run: &&Planned| self.task.machine.mounting(&run.plan.mounting).is_some_and(|on| on.name == mounting.name);
+        let found = self.runs.iter().filter(is_on).filter_map(|run| run.plan.find.as_ref());
+        found.map(|find| find.tolerance_mm).reduce(f64::max)
+    }
+
     /// Touches that were made or planned before.
     pub(super) fn n_given(&self) -> usize {
         self.runs.iter().map(|r| r.plan.touches.len()).sum()
@@ -181,7 +189,10 @@ impl<'a> Setting<'a> {
     ) -> Result<Chosen> {
         let machine = self.task.machine;
         let nothing = || Failure::new("next::nothing", "nothing can be touched");
+        let by_eye_mm = self.by_eye_mm(mounting);
         let mut pool = bundles(machine, mounting, &SWIVELS_DEG);
+        // what was found with one stylus is not found for another
+        pool.retain(|bundle| by_eye_mm.is_none() || bundle.manner.stylus.is_none());
         let mut scale = 1.0;
         let mut found: Option<Chosen> = None;
         for _ in 0..MOST_ROUNDS {
@@ -212,7 +223,7 @@ impl<'a> Setting<'a> {
             if chosen.is_empty() {
                 break;
             }
-            let head = Head { by: "plan-next", name, says: &says(questions), again: &[] };
+            let head = Head { by: "plan-next", name, says: &says(questions), again: &[], by_eye_mm };
             let text = program_text(machine, mounting, &head, &pool, &chosen);
             let (spec, _) = program::load(&source("plan-next", text.clone()))?;
             let (generated, _) = match program::generate(machine, &spec, &Options::default()) {

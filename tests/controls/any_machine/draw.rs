@@ -256,6 +256,7 @@ pub fn program(
         ball_radius_mm: machine.probe.ball_radius,
         tool_length_mm: machine.tool.length_mm,
         placement_tolerance_mm: None,
+        find: None,
         blocks,
         touches,
         skipped: Vec::new(),
