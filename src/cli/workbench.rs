@@ -1,11 +1,13 @@
-//! `axiscal workbench`: a study live in the browser.
+//! `axiscal workbench`: a study live in the browser, or a page on which one is made.
 
 use super::{Answer, Io};
 use crate::diag::{Failure, Finding, Result};
 use crate::files;
 use crate::workbench::Answered;
 use crate::workbench::desk::Desk;
+use crate::workbench::recent::Recent;
 use crate::workbench::server::Server;
+use crate::workbench::start::StartServer;
 use crate::workflow::Disk;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -17,8 +19,8 @@ const CALL_TIME: Duration = Duration::from_secs(600);
 
 #[derive(Debug, clap::Args)]
 pub struct Args {
-    /// The study; what is switched in the page is written into it
-    pub study: PathBuf,
+    /// The study; what is switched in the page is written into it. Without it a page opens on which you choose or make one
+    pub study: Option<PathBuf>,
     /// Port on 127.0.0.1 (default: any that is free)
     #[arg(long, value_name = "N", default_value_t = 0)]
     pub port: u16,
@@ -33,25 +35,61 @@ pub struct Args {
 /// When the study is unusable or the port is taken.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     super::guard::say_at_once();
+    let recent = Recent::new(data_folder());
+    let Some(given) = &args.study else { return start(args, recent, io) };
     // a later change of the working folder, or a link that is turned elsewhere, must not move the study
-    let study = std::path::absolute(&args.study).unwrap_or_else(|_| args.study.clone());
-    let server = Server::new(Desk::new(study, Disk::default(), run_verb)?, args.port)?;
+    let study = std::path::absolute(given).unwrap_or_else(|_| given.clone());
+    let server = Server::new(Desk::new(study.clone(), Disk::default(), run_verb)?, args.port)?;
+    recent.add(&study);
     let address = server.address();
-    io.say(format!("{}: {address}", args.study.display()));
+    io.say(format!("{}: {address}", given.display()));
     io.say("every step is written into the study at once; Ctrl-C ends the workbench");
-    io.answer(
-        &json!({ "format": "axiscal-workbench/1", "study": args.study.display().to_string(), "address": address }),
-    );
+    io.answer(&json!({ "format": "axiscal-workbench/1", "study": given.display().to_string(), "address": address }));
+    show(&address, args, io);
+    server.run()?;
+    Ok(Answer::Done)
+}
+
+/// The page on which a study is chosen or made.
+fn start(args: &Args, recent: Recent, io: &Io) -> Result<Answer> {
+    let folder = std::env::current_dir().map_err(|e| {
+        Failure::new("workbench::folder", format!("the working folder cannot be used: {e}"))
+            .help("change to a folder in which new studies may be made")
+    })?;
+    let server = StartServer::new(folder.clone(), recent, run_verb, args.port)?;
+    let address = server.address();
+    io.say(format!("choose or make a study: {address}"));
+    io.say(format!("new studies are made below {}; Ctrl-C ends the workbench", folder.display()));
+    io.answer(&json!({ "format": "axiscal-workbench/1", "study": null, "address": address }));
+    show(&address, args, io);
+    server.run()?;
+    Ok(Answer::Done)
+}
+
+/// Where programs keep data of the user, as the system says.
+fn data_folder() -> Option<PathBuf> {
+    let named = |name: &str| std::env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute());
+    let home = || named("HOME");
+    let all = if cfg!(windows) {
+        named("LOCALAPPDATA")
+    } else if cfg!(target_os = "macos") {
+        home().map(|h| h.join("Library/Application Support"))
+    } else {
+        named("XDG_DATA_HOME").or_else(|| home().map(|h| h.join(".local/share")))
+    };
+    all.map(|folder| folder.join("axiscal"))
+}
+
+/// Opens the address in the user's browser, where that is wanted.
+fn show(address: &str, args: &Args, io: &Io) {
     use std::io::Write as _;
     let _ = std::io::stdout().flush();
     if !args.no_open
-        && let Err(e) = open::that_detached(&address)
+        && let Err(e) = open::that_detached(address)
     {
         io.report(&[Finding::warning("workbench::browser", format!("no browser could be opened: {e}"))
             .help("open the address by hand; --no-open leaves this out")]);
     }
-    server.run()?;
-    Ok(Answer::Done)
 }
 
 /// Calls this program: the very verb that a user would type, in a process of its own that cannot hurt this one.

@@ -12,7 +12,7 @@ use crate::workflow::history::{history_path, read_history};
 use crate::workflow::view::verdict_of;
 use crate::workflow::{Disk, Environment, load_study};
 use std::hash::{Hash, Hasher};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// How the file of the user's own effects is called where a study names none.
@@ -125,16 +125,33 @@ impl Desk {
     pub fn call(&self, verb: &Verb) -> Result<Answered> {
         let folder = match verb {
             Verb::PlanNext(..) => format!("{}-next", self.stem),
-            Verb::Export(controller) => format!("{}-compensation-{controller}", self.stem),
-        };
-        let (name, controller, more) = match verb {
-            Verb::PlanNext(controller, minutes) => ("plan-next", controller, format!("--minutes={minutes}")),
-            // the page says beside the button what that accepts
-            Verb::Export(controller) => ("export", controller, "--accept-unverified".to_owned()),
+            Verb::Export(controller, _) => format!("{}-compensation-{controller}", self.stem),
         };
         let (study, out) = (self.study.display().to_string(), self.folder.join(&folder).display().to_string());
-        let words = [name.to_owned(), study, "--out".into(), out, "--controller".into(), controller.clone(), more];
-        (self.call)(&words, folder)
+        let words = |name: &str, controller: &str, more: Vec<String>| {
+            let first = [name, &study, "--out", &out, "--controller", controller];
+            first.into_iter().map(str::to_owned).chain(more).collect::<Vec<_>>()
+        };
+        match verb {
+            Verb::PlanNext(controller, minutes) => {
+                (self.call)(&words("plan-next", controller, vec![format!("--minutes={minutes}")]), folder)
+            }
+            Verb::Export(controller, answers) => {
+                let kept = tempfile::tempdir().map_err(|e| {
+                    Failure::new("workbench::upload", format!("no folder for the file of the page: {e}"))
+                })?;
+                let more = answers.words(controller, kept.path())?;
+                let mut answered = (self.call)(&words("export", controller, more), folder)?;
+                answers.rename(&mut answered, controller, kept.path());
+                Ok(answered)
+            }
+        }
+    }
+
+    /// The folder of the study.
+    #[must_use]
+    pub fn folder(&self) -> &Path {
+        &self.folder
     }
 
     /// The verdict in words and what to do next, as the report has them.

@@ -2,27 +2,36 @@
 //!
 //! [`session`] holds the study and makes every step (one writer, each step with the version that it was asked for);
 //! [`shelf`] keeps the models that were fitted and fits what is likely to be asked for next;
+//! [`calls`] begins the verbs that write files, [`export`] is the compensation from the page, [`upload`] a file that the page
+//! sends, [`start`] the page before a study is open, [`recent`] the studies that were open before;
 //! [`evidence`] works out behind it what is missing; [`guard`] says which request may be answered; [`server`] carries
 //! requests there and answers back; [`desk`] knows the study's files.
 //!
 //! It is not: a file server. No part of a request ever becomes a path: scripts and styles are a fixed table of embedded
-//! files, and what is written lies in places that the study's own name gives.
+//! files, and what is written lies in places that the study's own name gives. The start page writes into a new folder of its own,
+//! under names of plain signs.
 
+pub mod calls;
 pub mod desk;
 pub mod draft;
 pub mod evidence;
+pub mod export;
 pub mod guard;
 pub mod pages;
+pub mod recent;
 pub mod record;
 pub mod server;
 pub mod session;
 pub mod shelf;
+pub mod start;
+pub mod upload;
 
 use crate::diag::Finding;
 use crate::model::data::Data;
 use crate::study::history::History;
 use crate::workflow::Loaded;
 use serde_json::Value;
+pub use session::Snapshot;
 use std::sync::Arc;
 
 /// A study with all that it names, read.
@@ -57,8 +66,8 @@ pub enum Place {
 pub enum Verb {
     /// `plan-next`, with the controller and the minutes.
     PlanNext(String, f64),
-    /// `export`, with the controller.
-    Export(String),
+    /// `export`, with the controller and the answers to its questions.
+    Export(String, export::ExportAnswers),
 }
 
 /// What a verb has answered.

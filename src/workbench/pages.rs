@@ -4,14 +4,22 @@ use axum::http::HeaderName;
 
 pub const PAGE: &str = include_str!("../../web/workbench.html");
 
+/// The page before a study is open.
+pub const START: &str = include_str!("../../web/start.html");
+
 const SCRIPT: &str = "text/javascript; charset=utf-8";
 const STYLE: &str = "text/css; charset=utf-8";
 
 /// Name, kind, contents.
-const ASSETS: [(&str, &str, &str); 20] = [
+const ASSETS: [(&str, &str, &str); 25] = [
     ("plotly.min.js", SCRIPT, include_str!("../../web/vendor/plotly.min.js")),
     ("tokens.css", STYLE, include_str!("../../web/tokens.css")),
     ("workbench.css", STYLE, include_str!("../../web/workbench.css")),
+    ("style.css", STYLE, include_str!("../../web/style.css")),
+    ("start.css", STYLE, include_str!("../../web/start.css")),
+    ("start.js", SCRIPT, include_str!("../../web/start.js")),
+    ("ask.js", SCRIPT, include_str!("../../web/workbench/ask.js")),
+    ("export.js", SCRIPT, include_str!("../../web/workbench/export.js")),
     ("main.js", SCRIPT, include_str!("../../web/workbench/main.js")),
     ("talk.js", SCRIPT, include_str!("../../web/workbench/talk.js")),
     ("events.js", SCRIPT, include_str!("../../web/workbench/events.js")),
@@ -63,7 +71,7 @@ mod tests {
             let parts = text.split(before).skip(1);
             parts.map(|p| p.split(['"', '\'']).next().unwrap_or_default().to_owned()).collect()
         };
-        for name in quoted(PAGE, "\"/assets/") {
+        for name in [PAGE, START].iter().flat_map(|page| quoted(page, "\"/assets/")) {
             assert!(asset(&name).is_some(), "{name}");
         }
         for (of, _, text) in ASSETS.iter().filter(|a| a.1 == SCRIPT && a.0 != "plotly.min.js") {

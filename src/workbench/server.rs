@@ -9,7 +9,7 @@ use super::guard::{Denied, Guard};
 use super::record::{self, Behind, Job};
 use super::session::{Ask, Refused, Session, Snapshot};
 use super::shelf::Shelf;
-use super::{Verb, evidence, pages};
+use super::{calls, evidence, pages};
 use crate::diag::{Failure, Result};
 use axum::Router;
 use axum::body::{Body, Bytes};
@@ -19,16 +19,19 @@ use axum::middleware::{Next, from_fn_with_state};
 use axum::response::sse::{Event, KeepAlive, Sse};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
+use hyper::service::Service as _;
 use serde::Deserialize;
 use serde_json::json;
 use std::net::{Ipv4Addr, SocketAddr};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, mpsc};
 use std::time::Duration;
 use tokio::sync::{Semaphore, broadcast};
 
 /// Longest body of a request, bytes: 30 000 touches chosen at once are 300 kB.
 const LONGEST_BODY: usize = 512 * 1024;
+/// The same where a file of the control comes with it.
+const LONGEST_CALL: usize = 16 * 1024 * 1024;
 const MOST_CONNECTIONS: usize = 64;
 /// Streams of events at a time: the other connections stay free for requests. The tabs of a browser share one.
 const MOST_STREAMS: usize = 24;
@@ -41,16 +44,18 @@ const PAINTS_FIRST: Duration = Duration::from_millis(100);
 
 /// What all requests share.
 pub struct Shared {
-    session: Mutex<Session>,
+    pub(super) session: Mutex<Session>,
     shelf: Arc<Shelf>,
     behind: Mutex<Behind>,
-    job: Mutex<Option<Job>>,
-    busy: AtomicBool,
+    pub(super) job: Mutex<Option<Job>>,
+    pub(super) busy: AtomicBool,
+    /// The files that the last export wrote: their names and contents.
+    pub(super) exported: Mutex<super::export::Exported>,
     wake: Mutex<mpsc::Sender<()>>,
     events: broadcast::Sender<String>,
     streams: Arc<Semaphore>,
     guard: Guard,
-    desk: Arc<Desk>,
+    pub(super) desk: Arc<Desk>,
 }
 
 /// A panic elsewhere has left what the lock guards as it was before: see the head of this file.
@@ -59,9 +64,33 @@ pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 impl Shared {
-    fn tell(&self, what: &str, version: u64) {
+    pub(super) fn tell(&self, what: &str, version: u64) {
         // nobody listening is no error
         let _ = self.events.send(json!({ "what": what, "version": version }).to_string());
+    }
+
+    /// Opens the study.
+    ///
+    /// # Errors
+    /// When it is unusable.
+    fn new(desk: Desk, guard: Guard) -> Result<(Arc<Self>, mpsc::Receiver<()>)> {
+        let desk = Arc::new(desk);
+        let session = Session::open(desk.clone())?;
+        let (wake, woken) = mpsc::channel();
+        let shared = Arc::new(Self {
+            shelf: session.shelf(),
+            session: Mutex::new(session),
+            behind: Mutex::default(),
+            job: Mutex::new(None),
+            busy: AtomicBool::new(false),
+            exported: Mutex::default(),
+            wake: Mutex::new(wake),
+            events: broadcast::channel(64).0,
+            streams: Arc::new(Semaphore::new(MOST_STREAMS)),
+            guard,
+            desk,
+        });
+        Ok((shared, woken))
     }
 
     /// A new state: the page hears of it, and the thread behind begins.
@@ -84,28 +113,8 @@ impl Server {
     /// # Errors
     /// When the study is unusable or the port is taken.
     pub fn new(desk: Desk, port: u16) -> Result<Self> {
-        let desk = Arc::new(desk);
-        let session = Session::open(desk.clone())?;
-        let taken = |e: std::io::Error| {
-            Failure::new("workbench::port", format!("port {port} of 127.0.0.1 cannot be used: {e}"))
-                .help("name another one with --port, or none: then a free one is taken")
-        };
-        let listener = std::net::TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, port))).map_err(taken)?;
-        listener.set_nonblocking(true).map_err(taken)?;
-        let port = listener.local_addr().map_err(taken)?.port();
-        let (wake, woken) = mpsc::channel();
-        let shared = Arc::new(Shared {
-            shelf: session.shelf(),
-            session: Mutex::new(session),
-            behind: Mutex::default(),
-            job: Mutex::new(None),
-            busy: AtomicBool::new(false),
-            wake: Mutex::new(wake),
-            events: broadcast::channel(64).0,
-            streams: Arc::new(Semaphore::new(MOST_STREAMS)),
-            guard: Guard::new(port, super::guard::token()?),
-            desk,
-        });
+        let (listener, guard) = listen(port)?;
+        let (shared, woken) = Shared::new(desk, guard)?;
         Ok(Self { listener, shared, woken })
     }
 
@@ -120,24 +129,67 @@ impl Server {
     /// # Errors
     /// When no threads can be had.
     pub fn run(self) -> Result<()> {
-        let no_threads = |e: std::io::Error| Failure::new("workbench::threads", format!("no thread can be had: {e}"));
-        let shared = self.shared.clone();
-        let woken = self.woken;
-        std::thread::Builder::new()
-            .name("evidence".into())
-            .spawn(move || work_behind(&shared, &woken))
-            .map_err(no_threads)?;
-        let shared = self.shared.clone();
-        std::thread::Builder::new().name("disk".into()).spawn(move || look_at_disk(&shared)).map_err(no_threads)?;
-        let version = lock(&self.shared.session).snapshot().version;
-        self.shared.changed(version);
-        let runtime =
-            tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().map_err(no_threads)?;
-        runtime.block_on(serve(self.listener, router(self.shared))).map_err(no_threads)
+        let router = begin(self.shared, self.woken)?;
+        run(self.listener, move || router.clone())
     }
 }
 
-async fn serve(listener: std::net::TcpListener, router: Router) -> std::io::Result<()> {
+/// Takes a port of this machine (0: any that is free), and makes the guard of what is answered there.
+///
+/// # Errors
+/// When the port is taken.
+pub(super) fn listen(port: u16) -> Result<(std::net::TcpListener, Guard)> {
+    let taken = |e: std::io::Error| {
+        Failure::new("workbench::port", format!("port {port} of 127.0.0.1 cannot be used: {e}"))
+            .help("name another one with --port, or none: then a free one is taken")
+    };
+    let listener = std::net::TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, port))).map_err(taken)?;
+    listener.set_nonblocking(true).map_err(taken)?;
+    let port = listener.local_addr().map_err(taken)?.port();
+    Ok((listener, Guard::new(port, super::guard::token()?)))
+}
+
+fn no_threads(e: std::io::Error) -> Failure {
+    Failure::new("workbench::threads", format!("no thread can be had: {e}"))
+}
+
+/// Opens a study behind a guard that is there already, and begins the work behind it: its routes.
+///
+/// # Errors
+/// When the study is unusable.
+pub(super) fn open(desk: Desk, guard: Guard) -> Result<Router> {
+    let (shared, woken) = Shared::new(desk, guard)?;
+    begin(shared, woken)
+}
+
+fn begin(shared: Arc<Shared>, woken: mpsc::Receiver<()>) -> Result<Router> {
+    let own = shared.clone();
+    let work = move || work_behind(&own, &woken);
+    std::thread::Builder::new().name("evidence".into()).spawn(work).map_err(no_threads)?;
+    let own = shared.clone();
+    std::thread::Builder::new().name("disk".into()).spawn(move || look_at_disk(&own)).map_err(no_threads)?;
+    let version = lock(&shared.session).snapshot().version;
+    shared.changed(version);
+    Ok(router(shared))
+}
+
+/// Answers requests by the routes that hold when they come, until the process ends.
+///
+/// # Errors
+/// When no threads can be had.
+pub(super) fn run(
+    listener: std::net::TcpListener,
+    current: impl Fn() -> Router + Clone + Send + Sync + 'static,
+) -> Result<()> {
+    let runtime =
+        tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().map_err(no_threads)?;
+    runtime.block_on(serve(listener, current)).map_err(no_threads)
+}
+
+async fn serve(
+    listener: std::net::TcpListener,
+    current: impl Fn() -> Router + Clone + Send + Sync + 'static,
+) -> std::io::Result<()> {
     let listener = tokio::net::TcpListener::from_std(listener)?;
     let places = Arc::new(Semaphore::new(MOST_CONNECTIONS));
     loop {
@@ -148,7 +200,11 @@ async fn serve(listener: std::net::TcpListener, router: Router) -> std::io::Resu
             continue;
         };
         let _ = stream.set_nodelay(true);
-        let service = hyper_util::service::TowerToHyperService::new(router.clone());
+        let current = current.clone();
+        // a connection outlives the opening of a study
+        let service = hyper::service::service_fn(move |request| {
+            hyper_util::service::TowerToHyperService::new(current()).call(request)
+        });
         tokio::spawn(async move {
             let connection = hyper::server::conn::http1::Builder::new()
                 .timer(hyper_util::rt::TokioTimer::new())
@@ -170,30 +226,41 @@ pub fn router(shared: Arc<Shared>) -> Router {
         .route("/api/step", post(step))
         .route("/api/try", post(try_out))
         .route("/api/sketch", post(sketch))
-        .route("/api/call", post(call))
-        .layer(from_fn_with_state(shared.clone(), with_token));
-    Router::new()
-        .route("/", get(page))
+        .route("/api/call", post(calls::call).layer(DefaultBodyLimit::max(LONGEST_CALL)))
+        .route("/api/export", get(calls::export_form))
+        .route("/api/export/zip", get(calls::exported_zip))
+        .route("/api/export/file/{number}", get(calls::exported_file));
+    let api = guarded(api, &shared.guard, LONGEST_CALL);
+    let guard = shared.guard.clone();
+    around(Router::new().route("/", get(|| page(pages::PAGE))).merge(api), guard).with_state(shared)
+}
+
+/// Routes that need the token, and take no body longer than that of the longest request.
+pub(super) fn guarded<S: Clone + Send + Sync + 'static>(api: Router<S>, guard: &Guard, longest: usize) -> Router<S> {
+    api.layer(from_fn_with_state((guard.clone(), longest), with_token))
+}
+
+/// What holds for every request: scripts and styles, limits, and the check where it comes from.
+pub(super) fn around<S: Clone + Send + Sync + 'static>(routes: Router<S>, guard: Guard) -> Router<S> {
+    routes
         .route("/assets/{name}", get(asset))
-        .merge(api)
         .fallback(|| async { refusal(StatusCode::NOT_FOUND, "path", "there is nothing here", None) })
-        .layer(from_fn_with_state(shared.clone(), from_here))
+        .layer(from_fn_with_state(guard, from_here))
         .layer(DefaultBodyLimit::max(LONGEST_BODY))
         .layer(tower_http::timeout::TimeoutLayer::with_status_code(StatusCode::REQUEST_TIMEOUT, ANSWER_TIME))
         .layer(tower_http::catch_panic::CatchPanicLayer::custom(|_: Box<dyn std::any::Any + Send>| fault()))
-        .with_state(shared)
 }
 
-fn answer_json(bytes: Vec<u8>) -> Response {
+pub(super) fn answer_json(bytes: Vec<u8>) -> Response {
     ([(header::CONTENT_TYPE, "application/json")], bytes).into_response()
 }
 
-fn refusal(status: StatusCode, code: &str, says: &str, help: Option<&str>) -> Response {
+pub(super) fn refusal(status: StatusCode, code: &str, says: &str, help: Option<&str>) -> Response {
     let body = json!({ "error": code, "messages": [{ "severity": "error", "message": says, "help": help }] });
     (status, [(header::CONTENT_TYPE, "application/json")], body.to_string()).into_response()
 }
 
-fn fault() -> Response<Body> {
+pub(super) fn fault() -> Response<Body> {
     refusal(
         StatusCode::INTERNAL_SERVER_ERROR,
         "fault",
@@ -202,7 +269,7 @@ fn fault() -> Response<Body> {
     )
 }
 
-fn refused(why: Refused) -> Response {
+pub(super) fn refused(why: Refused) -> Response {
     let (status, body) = match why {
         Refused::Stale(version) => (
             StatusCode::CONFLICT,
@@ -225,8 +292,8 @@ fn denied(d: Denied) -> Response {
 }
 
 /// Is the request from the page of this server? And headers that keep the page to itself.
-async fn from_here(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
-    let mut response = match shared.guard.check_origin(request.method(), request.headers()) {
+async fn from_here(State(guard): State<Guard>, request: Request, next: Next) -> Response {
+    let mut response = match guard.check_origin(request.method(), request.headers()) {
         Ok(()) => next.run(request).await,
         Err(d) => denied(d),
     };
@@ -236,13 +303,13 @@ async fn from_here(State(shared): State<Arc<Shared>>, request: Request, next: Ne
     response
 }
 
-async fn with_token(State(shared): State<Arc<Shared>>, request: Request, next: Next) -> Response {
-    if let Err(d) = shared.guard.check_token(request.headers()) {
+async fn with_token(State((guard, longest)): State<(Guard, usize)>, request: Request, next: Next) -> Response {
+    if let Err(d) = guard.check_token(request.headers()) {
         return denied(d);
     }
     // a body that is promised too long is not waited for
     let promised = request.headers().get(header::CONTENT_LENGTH).and_then(|v| v.to_str().ok()?.parse::<u64>().ok());
-    if promised.is_some_and(|n| n > LONGEST_BODY as u64) {
+    if promised.is_some_and(|n| n > longest as u64) {
         return refusal(StatusCode::PAYLOAD_TOO_LARGE, "length", "the request is too long", None);
     }
     let json = |h: &HeaderMap| {
@@ -255,8 +322,8 @@ async fn with_token(State(shared): State<Arc<Shared>>, request: Request, next: N
     next.run(request).await
 }
 
-async fn page() -> Response {
-    ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], pages::PAGE).into_response()
+pub(super) async fn page(text: &'static str) -> Response {
+    ([(header::CONTENT_TYPE, "text/html; charset=utf-8")], text).into_response()
 }
 
 async fn asset(Path(name): Path<String>) -> Response {
@@ -271,7 +338,7 @@ async fn aside(shared: Arc<Shared>, work: impl FnOnce(&Shared) -> Response + Sen
     tokio::task::spawn_blocking(move || work(&shared)).await.unwrap_or_else(|_| fault())
 }
 
-fn snapshot(shared: &Shared) -> Snapshot {
+pub(super) fn snapshot(shared: &Shared) -> Snapshot {
     lock(&shared.session).snapshot()
 }
 
@@ -354,7 +421,7 @@ impl AskAsWritten {
     }
 }
 
-fn read<'a, T: Deserialize<'a>>(body: &'a Bytes) -> std::result::Result<T, Box<Response>> {
+pub(super) fn read<'a, T: Deserialize<'a>>(body: &'a Bytes) -> std::result::Result<T, Box<Response>> {
     serde_json::from_slice(body).map_err(|e| {
         Box::new(refusal(StatusCode::BAD_REQUEST, "json", &format!("the request cannot be read: {e}"), None))
     })
@@ -449,74 +516,6 @@ async fn sketch(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
         }
     })
     .await
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct CallAsked {
-    version: u64,
-    verb: VerbAsWritten,
-    controller: String,
-    minutes: Option<f64>,
-}
-
-#[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum VerbAsWritten {
-    PlanNext,
-    Export,
-}
-
-/// Begins a verb; its answer comes as an event.
-async fn call(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
-    let asked: CallAsked = match read(&body) {
-        Ok(asked) => asked,
-        Err(response) => return *response,
-    };
-    let now = snapshot(&shared);
-    if now.version != asked.version {
-        return refused(Refused::Stale(now.version));
-    }
-    let unusable =
-        |says: &str, help: &str| refused(Refused::Unusable(Failure::new("workbench::call", says).help(help)));
-    // a word of the table, and never a path
-    if !Desk::controllers().contains(&asked.controller) {
-        return unusable("no controller has that name", "choose one of the list");
-    }
-    let minutes = asked.minutes.unwrap_or(10.0);
-    if !(minutes > 0.0 && minutes <= 600.0) {
-        return unusable("the time is no usable number", "up to 600 minutes");
-    }
-    let (name, verb) = match asked.verb {
-        VerbAsWritten::PlanNext => ("plan-next", Verb::PlanNext(asked.controller, minutes)),
-        VerbAsWritten::Export => ("export", Verb::Export(asked.controller)),
-    };
-    if shared.busy.swap(true, Ordering::SeqCst) {
-        return refusal(
-            StatusCode::TOO_MANY_REQUESTS,
-            "busy",
-            "another task is still running",
-            Some("wait for its end"),
-        );
-    }
-    let began = Job { verb: name, version: now.version, answered: None, failed: Vec::new() };
-    *lock(&shared.job) = Some(began.clone());
-    shared.tell("job", now.version);
-    tokio::task::spawn_blocking(move || {
-        let result = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| shared.desk.call(&verb)));
-        let done = match result {
-            Ok(Ok(answered)) => Job { answered: Some(answered), ..began },
-            Ok(Err(failure)) => Job { failed: record::messages(&failure.0), ..began },
-            Err(_) => {
-                let failure = Failure::new("workbench::fault", "a fault of the program");
-                Job { failed: record::messages(&failure.0), ..began }
-            }
-        };
-        *lock(&shared.job) = Some(done);
-        shared.busy.store(false, Ordering::SeqCst);
-        shared.tell("job", now.version);
-    });
-    (StatusCode::ACCEPTED, [(header::CONTENT_TYPE, "application/json")], "{}").into_response()
 }
 
 /// Works out what the touches say of every effect, the newest state first; what a newer one overtakes is thrown away.

@@ -19,7 +19,7 @@ async function oneScreen(t) {
     const sideways = await page.evaluate(() => document.documentElement.scrollWidth - innerWidth);
     holds(sideways <= 0, `at ${width} the page is ${sideways} px wider than the screen`);
     if (width < 1000) continue;
-    const outside = await page.evaluate(() => ["#verdict", "#rms", "#ladder", "#undo", "#redo", "#candidates > li", "#own-formula", "#sketch", "#residuals .plot", "#multiples", "#where-table", "#main-step button", "#advice li", "#plan-next", "#export"]
+    const outside = await page.evaluate(() => ["#verdict", "#rms", "#ladder", "#undo", "#redo", "#candidates > li", "#own-formula", "#sketch", "#residuals .plot", "#multiples", "#where-table", "#main-step button", "#advice li", "#plan-next", "#open-export"]
       .filter((s) => { const r = document.querySelector(s).getBoundingClientRect(); return !(r.width > 0 && r.top >= 0 && r.bottom <= innerHeight + 1 && r.left >= 0 && r.right <= innerWidth + 1); }));
     equal(outside, [], `outside the screen at ${width} × ${height}`);
     holds(await page.evaluate(() => document.documentElement.scrollHeight <= innerHeight), "the page scrolls");
@@ -214,15 +214,15 @@ async function keyboardOnly(t) {
   await after(page, () => page.keyboard.press("Control+z"));
   equal(await number(page, "rms"), left, "forth");
   await to("[role=tab][aria-selected=true]");
-  for (const id of ["machine", "touches", "results", "log"]) {
+  for (const id of ["machine", "touches", "results", "log", "export-view"]) {
     await page.keyboard.press("ArrowRight");
     equal(await page.isVisible(`#${id}`), true, id);
   }
-  await to("#controller");
-  await page.keyboard.type("linuxcnc");
+  await to("#open-export");
+  await page.keyboard.press("Enter");
   await to("#export");
   await page.keyboard.press("Enter");
-  await page.waitForSelector("#job[data-state=done]", { timeout: 60_000 });
+  await page.waitForSelector("#export-panel[data-state=done]", { timeout: 60_000 });
   holds(existsSync(join(folder, "study-compensation-linuxcnc/compensation.json")), "no compensation is there");
   equal(seen.errors, [], "errors in the console");
 }

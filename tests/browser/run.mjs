@@ -7,8 +7,10 @@ import { chromium } from "playwright-core";
 import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
+import { exportCases } from "./export.mjs";
 import { reportCases } from "./report.mjs";
 import { oneScreenCases } from "./one_screen.mjs";
+import { startCases } from "./start.mjs";
 import { workbenchCases } from "./workbench.mjs";
 
 const out = process.env.AXISCAL_BROWSER_OUT;
@@ -17,7 +19,7 @@ const pictures = process.env.AXISCAL_PICTURES ? join(process.env.AXISCAL_ROOT, "
 if (pictures) mkdirSync(pictures, { recursive: true });
 
 const wanted = process.argv.slice(2);
-const cases = [...reportCases, ...oneScreenCases, ...workbenchCases].filter(([name]) => !wanted.length || wanted.some((w) => name.includes(w)));
+const cases = [...reportCases, ...oneScreenCases, ...startCases, ...workbenchCases, ...exportCases].filter(([name]) => !wanted.length || wanted.some((w) => name.includes(w)));
 const dir = mkdtempSync(join(tmpdir(), "axiscal-browser-"));
 
 const browser = await chromium.launch({

@@ -164,8 +164,15 @@ export function many(dir) {
 }
 
 /** A workbench of its own; ends with the case. */
-export async function workbench(study, atEnd) {
-  const child = spawn(process.env.AXISCAL, ["--json", "workbench", study, "--no-open"], { stdio: ["ignore", "pipe", "inherit"] });
+export const workbench = (study, atEnd) => served([study], {}, join(study, "../.."), atEnd);
+
+/** The page on which a study is made, started in a folder; `dir` keeps the list of earlier studies. */
+export const startPage = (folder, dir, atEnd) => served([], { cwd: folder }, dir, atEnd);
+
+async function served(study, options, dir, atEnd) {
+  // the list of earlier studies is not that of the person who runs the tests
+  const env = { ...process.env, XDG_DATA_HOME: join(dir, "data") };
+  const child = spawn(process.env.AXISCAL, ["--json", "workbench", ...study, "--no-open"], { stdio: ["ignore", "pipe", "inherit"], env, ...options });
   atEnd(() => child.kill("SIGKILL"));
   let said = "";
   for await (const part of child.stdout) {

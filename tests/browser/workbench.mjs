@@ -90,6 +90,7 @@ async function wholeLoop(t) {
 
   // and the compensation is written beside the study
   await page.selectOption("#controller", "linuxcnc");
+  await openView(page, "export");
   await page.click("#export");
   await page.waitForSelector("#job[data-state=done]", { timeout: 60_000 });
   holds(existsSync(join(folder, "study-compensation-linuxcnc/compensation.json")), "no compensation is there");

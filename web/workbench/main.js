@@ -12,6 +12,7 @@ import "./space.js";
 import "./correlation.js";
 import "./touches.js";
 import "./formula.js";
+import { exportPanel } from "./export.js";
 import { byId, element, show, significant } from "./words.js";
 
 onOpen("plots", shownAgain);
@@ -82,5 +83,7 @@ document.addEventListener("keydown", (e) => {
   }
 });
 for (const skip of document.querySelectorAll(".skip")) skip.addEventListener("click", () => { if (skip.hash === "#plots") open("plots"); });
+
+exportPanel(byId("export-panel"));
 
 listen();

@@ -3,6 +3,7 @@
 import { state, on, call, trouble } from "./talk.js";
 import { switchEffect } from "./effects.js";
 import { openFormula, sketch } from "./formula.js";
+import { open } from "./tabs.js";
 import { byId, element } from "./words.js";
 
 /** Steps that are shown at once; the rest is behind a fold. */
@@ -11,7 +12,7 @@ const FIRST = 3;
 const BUTTONS = {
   add: (act) => [`Add ${state.inputs.effects.find((e) => e.id === act.effect)?.name ?? act.effect}`, () => switchEffect(act.effect, true)],
   "measure-more": () => ["Write this program", () => byId("plan-next").click()],
-  export: () => ["Export the compensation", () => byId("export").click()],
+  export: () => ["Export the compensation", () => byId("open-export").click()],
   sketch: () => ["Sketch it for me", sketch],
 };
 
@@ -41,18 +42,15 @@ function draw() {
 on("live", (live, newer) => { if (newer) draw(); });
 on("behind", draw);
 
-for (const verb of ["plan-next", "export"]) {
-  byId(verb).addEventListener("click", async () => {
-    const what = { verb, controller: byId("controller").value };
-    if (verb === "plan-next") what.minutes = Number(byId("minutes").value);
-    try {
-      trouble(null);
-      await call(what);
-    } catch (error) {
-      trouble(error);
-    }
-  });
-}
+byId("plan-next").addEventListener("click", async () => {
+  try {
+    trouble(null);
+    await call({ verb: "plan-next", controller: byId("controller").value, minutes: Number(byId("minutes").value) });
+  } catch (error) {
+    trouble(error);
+  }
+});
+byId("open-export").addEventListener("click", () => open("export-view"));
 on("live", () => {
   const select = byId("controller");
   if (select.options.length) return;
@@ -75,7 +73,7 @@ on("job", (job) => {
     const files = answer?.files ? `\n${answer.files.join(", ")}` : "";
     at.textContent = `${says}${more}${files}${messages.length ? `\n${messages.join("\n")}` : ""}`;
   }
-  for (const verb of ["plan-next", "export"]) byId(verb).disabled = at.dataset.state === "running";
+  byId("plan-next").disabled = at.dataset.state === "running";
 });
 byId("own-formula").addEventListener("click", openFormula);
 byId("sketch").addEventListener("click", sketch);

@@ -24,7 +24,7 @@ impl Drop for Page {
 impl Page {
     pub fn open(program: &Program, at: &Path) -> Self {
         let mut command = program.command(at, &["--json", "workbench", "study.toml", "--no-open"]);
-        let mut child = command.stdout(Stdio::piped()).spawn().unwrap();
+        let mut child = command.env("XDG_DATA_HOME", at.join("data")).stdout(Stdio::piped()).spawn().unwrap();
         let mut out = BufReader::new(child.stdout.take().unwrap());
         let mut said = String::new();
         while !said.ends_with("}\n") {
