@@ -12,6 +12,7 @@ mod report;
 mod rooms;
 mod screens;
 mod shell;
+mod start_page;
 mod terminal;
 mod torture;
 mod workbench;

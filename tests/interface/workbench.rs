@@ -9,7 +9,7 @@ use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 /// A measured machine with an error that no model of it holds, made once.
-fn measured() -> &'static Path {
+pub fn measured() -> &'static Path {
     static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
     MADE.get_or_init(|| {
         let dir = tempfile::tempdir().unwrap();
@@ -45,10 +45,10 @@ fn folder() -> tempfile::TempDir {
     dir
 }
 
-struct Workbench {
+pub struct Workbench {
     child: Child,
     port: u16,
-    token: String,
+    pub token: String,
     study: PathBuf,
 }
 
@@ -59,14 +59,14 @@ impl Drop for Workbench {
     }
 }
 
-struct Answer {
-    status: u16,
+pub struct Answer {
+    pub status: u16,
     head: String,
-    body: String,
+    pub body: String,
 }
 
 impl Answer {
-    fn json(&self) -> Value {
+    pub fn json(&self) -> Value {
         serde_json::from_str(&self.body).unwrap_or_else(|e| panic!("{e}: {}", self.body))
     }
 }
@@ -78,7 +78,7 @@ impl Workbench {
     }
 
     /// The page before a study is open.
-    fn start(dir: &Path) -> Self {
+    pub fn start(dir: &Path) -> Self {
         Self::called(dir, &[], &dir.join(".data"))
     }
 
@@ -118,7 +118,7 @@ impl Workbench {
         Answer { status, head: head.to_owned(), body: body.to_owned() }
     }
 
-    fn send(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> Answer {
+    pub fn send(&self, method: &str, path: &str, headers: &[(&str, &str)], body: &str) -> Answer {
         let mut text = format!("{method} {path} HTTP/1.1\r\nConnection: close\r\n");
         for (name, value) in headers {
             text += &format!("{name}: {value}\r\n");
@@ -129,15 +129,15 @@ impl Workbench {
         self.raw(format!("{text}\r\n{body}").as_bytes())
     }
 
-    fn host(&self) -> String {
+    pub fn host(&self) -> String {
         format!("127.0.0.1:{}", self.port)
     }
 
-    fn get(&self, path: &str) -> Answer {
+    pub fn get(&self, path: &str) -> Answer {
         self.send("GET", path, &[("Host", &self.host()), ("X-Axiscal-Token", &self.token)], "")
     }
 
-    fn post(&self, path: &str, body: &str) -> Answer {
+    pub fn post(&self, path: &str, body: &str) -> Answer {
         let host = self.host();
         let origin = format!("http://{host}");
         let headers = [
@@ -261,77 +261,6 @@ fn no_path_of_a_request_reaches_the_disk() {
         &json!({ "version": version, "verb": "export", "controller": "linuxcnc", "out": "/tmp/x" }).to_string(),
     );
     assert_eq!(path_asked.status, 400, "{}", path_asked.body);
-}
-
-/// The start page takes files, and gives no word of a request to the disk as it is.
-#[test]
-fn the_start_page_writes_below_its_folder_alone() {
-    let above = tempfile::tempdir().unwrap();
-    let dir = above.path().join("here");
-    std::fs::create_dir(&dir).unwrap();
-    let w = Workbench::start(&dir);
-    let host = w.host();
-    for path in ["/api/start", "/api/state", "/api/start/new"] {
-        assert!(matches!(w.send("GET", path, &[("Host", &host)], "").status, 401 | 404), "{path}");
-    }
-    assert_eq!(w.send("GET", "/api/start", &[("Host", "evil.example"), ("X-Axiscal-Token", &w.token)], "").status, 403);
-    assert_eq!(w.get("/api/state").status, 404, "no study is open yet");
-    let offer = w.get("/api/start").json();
-    assert!(offer["machines"].as_array().unwrap().iter().any(|m| m["name"] == "swivel-head"), "{offer}");
-    let text = |name: &str| std::fs::read(measured().join(name)).unwrap();
-    let base64 = |bytes: &[u8]| {
-        const SIGNS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-        let mut out = String::new();
-        for part in bytes.chunks(3) {
-            let n = part.iter().fold(0_u32, |n, b| (n << 8) | u32::from(*b)) << (8 * (3 - part.len()));
-            for k in 0..4 {
-                out.push(if k <= part.len() { SIGNS[(n >> (18 - 6 * k) & 63) as usize] as char } else { '=' });
-            }
-        }
-        out
-    };
-    let file = |role: &str, name: &str, from: &str| json!({ "role": role, "name": name, "data": base64(&text(from)) });
-    let asked = |name: &str, machine: &str, controller: &str, files: Value| {
-        json!({ "name": name, "machine": machine, "controller": controller, "files": files }).to_string()
-    };
-    let both = || json!([file("plan", "../../../plan.json", "head.plan.json"), file("log", "/etc/x.log", "head.log")]);
-    // what cannot be used is refused, and leaves nothing
-    for (body, says) in [
-        (asked("a", "swivel-head", "linuxcnc", json!([])), "nothing to make a study of"),
-        (asked("a", "swivel-head", "linuxcnc", json!([file("plan", "p.json", "head.plan.json")])), "do not pair"),
-        (asked("a", "no-such-machine", "linuxcnc", both()), "no machine is called"),
-        (asked("a", "--out=/tmp/x", "linuxcnc", both()), "no machine is called"),
-        (asked("a", "swivel-head", "../mine.toml", both()), "no controller has that name"),
-        (asked("a", "swivel-head", "csv", both()), "error"),
-        (json!({ "name": "a", "machine": "swivel-head", "files": [], "out": "/tmp/x" }).to_string(), "unknown field"),
-        ("{".to_owned(), "cannot be read"),
-    ] {
-        let answer = w.post("/api/start/new", &body);
-        assert_eq!(answer.status, 422, "{}", answer.body);
-        assert!(answer.body.contains(says), "{says}: {}", answer.body);
-    }
-    for number in ["0", "-1", "\"x\""] {
-        let status = w.post("/api/start/recent", &format!("{{\"number\":{number}}}")).status;
-        assert!(matches!(status, 400 | 422), "{number}: {status}");
-    }
-    assert_eq!(std::fs::read_dir(&dir).unwrap().count(), 0, "a refused study leaves nothing");
-    // a study of that name is not written over
-    std::fs::create_dir(dir.join("taken")).unwrap();
-    let answer = w.post("/api/start/new", &asked("taken", "swivel-head", "linuxcnc", both()));
-    assert!(answer.status == 422 && answer.body.contains("exists already"), "{}", answer.body);
-    let answer = w.post("/api/start/new", &asked("../..//over\u{0}there", "swivel-head", "linuxcnc", both()));
-    assert_eq!(answer.status, 200, "{}", answer.body);
-    let made = dir.join("over-there");
-    let mut names: Vec<_> =
-        std::fs::read_dir(&made).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-    names.retain(|name| !name.starts_with('.'));
-    names.sort();
-    assert_eq!(names, ["etc-x.log", "plan.json", "study.toml"]);
-    assert_eq!(std::fs::read_dir(above.path()).unwrap().count(), 1, "nothing beside the folder");
-    assert_eq!(std::fs::read(made.join("etc-x.log")).unwrap(), text("head.log"));
-    // and now the same address is its workbench
-    assert_eq!(w.get("/api/state").json()["study"], "study.toml");
-    assert_eq!(w.get("/api/start").status, 404);
 }
 
 #[test]
