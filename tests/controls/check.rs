@@ -479,11 +479,21 @@ fn variant(base: &str, lines: &str) -> Result<Postprocessor, axiscal::diag::Fail
 }
 
 /// Values that a builder or a user may give each setting, as the guide and the files name them.
-const SETTINGS: [(&[&str], &str, &[&str]); 33] = [
+const SETTINGS: [(&[&str], &str, &[&str]); 43] = [
     (&["fanuc", "haas"], "touch_program", &["7001"]),
     (&["fanuc", "haas"], "guarded_program", &["7002"]),
     (&["fanuc", "haas"], "rapid_program", &["7003"]),
     (&["fanuc", "haas"], "stopped_in", &["#100", "#599"]),
+    (&["fanuc", "haas"], "found_x", &["#100"]),
+    (&["sinumerik"], "found_x", &["R1"]),
+    (&["fanuc", "haas"], "found_y", &["#100"]),
+    (&["sinumerik"], "found_y", &["R1"]),
+    (&["fanuc", "haas"], "found_z", &["#100"]),
+    (&["sinumerik"], "found_z", &["R1"]),
+    (&["fanuc", "haas"], "found_off", &["#100"]),
+    (&["sinumerik"], "found_off", &["R1"]),
+    (&["fanuc", "haas"], "found_room", &["#100"]),
+    (&["sinumerik"], "found_room", &["R1"]),
     (&["fanuc", "haas"], "last_alarm", &["99"]),
     (&["fanuc", "haas"], "dry_run", &["no"]),
     (&["fanuc", "haas"], "program_number", &["1234"]),
