@@ -139,7 +139,7 @@ fn check_whole(machine: &Machine, post: &Postprocessor, source: &Source, against
                 (Some(written), Some(compared)) => {
                     as_written(written, &compared, &program, source, &checked.proof, &mut checked.findings);
                 }
-                (Some(_), None) => checked.findings.push(older_plan()),
+                (Some(_), None) => checked.findings.push(older_plan(plan)),
                 (None, _) => {}
             }
             checked.findings.extend(number);
@@ -525,10 +525,12 @@ fn begins(post: &Postprocessor, program: &runs::Program, meant: u32, source: &So
     }
 }
 
-/// A plan that holds nothing that a program could be compared with.
-fn older_plan() -> Finding {
+/// A plan that holds nothing that a program could be compared with. Moves that are relative to what was found are only proven
+/// for the program that was written: no older version wrote such plans.
+fn older_plan(plan: &Plan) -> Finding {
     let says = "the plan is of an older version and does not hold the program's statements: whether this is still the program that was written is not known";
-    Finding::warning("check::older_plan", says).help("`axiscal generate` writes plan and program anew")
+    let finding = if plan.find.is_some() { Finding::error } else { Finding::warning };
+    finding("check::older_plan", says).help("`axiscal generate` writes plan and program anew")
 }
 
 /// Is the program still what `generate` wrote? What was changed without harm is named.
