@@ -23,7 +23,7 @@ pub fn explained(points: &[Point], variable: &str) -> [Option<f64>; 3] {
             values[towards].push((x, sign * p.residual_um));
         }
     }
-    values.map(|of| adjusted_r2(of))
+    values.map(adjusted_r2)
 }
 
 fn adjusted_r2(mut of: Vec<(f64, f64)>) -> Option<f64> {

@@ -515,7 +515,7 @@ fn poses(now: &Snapshot) -> Vec<Pose> {
         members.entry(visit + 1).or_default().push(i);
     }
     let pose = |(visit, members): (usize, Vec<usize>)| {
-        let mut at = data.observations[members[0]].position.clone();
+        let mut at = data.observations[members[0]].position;
         for axis in machine.axes.iter().filter(|a| !a.name.is_rotary()) {
             let sum: f64 = members.iter().map(|&i| data.observations[i].position.get(axis.name)).sum();
             at.set(axis.name, sum / members.len() as f64);

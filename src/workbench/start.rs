@@ -91,7 +91,7 @@ fn router(start: &Arc<Start>) -> Router {
 enum NotOpen {
     Failed(Failure),
     /// What the verb said.
-    Said(Answered),
+    Said(Box<Answered>),
 }
 
 impl From<Failure> for NotOpen {
@@ -112,7 +112,7 @@ impl Start {
     /// Calls a verb on files below the folder, which is the working one.
     fn said(&self, words: &[String], folder: &str) -> std::result::Result<(), NotOpen> {
         let answered = (self.call)(words, folder.to_owned())?;
-        if answered.code == 2 { Err(NotOpen::Said(answered)) } else { Ok(()) }
+        if answered.code == 2 { Err(NotOpen::Said(Box::new(answered))) } else { Ok(()) }
     }
 
     fn demo(&self) -> std::result::Result<(), NotOpen> {

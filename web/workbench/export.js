@@ -40,6 +40,7 @@ export function exportPanel(container) {
   container.replaceChildren(element("h3", {}, "Write the compensation"), form, answer);
 
   let forms = [];
+  let busy = false;
   const byName = (name) => container.querySelector(`#${id(name)}`);
   const chosen = () => forms.find((f) => f.name === controller.value);
 
@@ -47,7 +48,7 @@ export function exportPanel(container) {
     const now = chosen();
     if (!now) return;
     says.textContent = now.cannot ? `${now.says}. ${now.cannot}` : now.says;
-    write.disabled = Boolean(now.cannot) || container.dataset.state === "running";
+    write.disabled = Boolean(now.cannot) || busy;
     fileLabel.textContent = now.present === "ini" ? "the machine's INI file" : "the control's backup of the values that change";
     byName("version-field").hidden = now.versions.length < 2;
     version.replaceChildren(...now.versions.map((v) => element("option", { value: v.name }, `${v.name}: ${v.says}`)));
@@ -98,11 +99,11 @@ export function exportPanel(container) {
 
   on("job", (job) => {
     // one task at a time, whichever it is
-    write.disabled = Boolean(job && !job.answered && !job.failed.length) || Boolean(chosen()?.cannot);
+    busy = Boolean(job && !job.answered && !job.failed.length);
+    write.disabled = busy || Boolean(chosen()?.cannot);
     if (job?.verb !== "export") return;
     const running = !job.answered && !job.failed.length;
     container.dataset.state = running ? "running" : job.answered?.code === 0 ? "done" : "failed";
-    write.disabled = running || Boolean(chosen()?.cannot);
     if (running) return tell(["The compensation is being written …"]);
     if (job.failed.length) return tell(lines({ messages: job.failed }));
     const { code, answer: written, messages, folder } = job.answered;

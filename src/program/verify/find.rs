@@ -27,7 +27,7 @@ impl<'a> Walk<'a, '_> {
         }
         let probe = &self.scene.machine.probe;
         let slow = touch.search_feed > 0.0 && touch.search_feed <= probe.slow_feed;
-        if !slow || !(touch.measure_feed > 0.0 && touch.back_off_mm > 0.0) {
+        if !(slow && touch.measure_feed > 0.0 && touch.back_off_mm > 0.0) {
             self.violation(i, format!("{}: it must search slowly", touch.says));
         }
         self.prove(i, at, nominal, How::Straight(Manner::ToContact(0)));
