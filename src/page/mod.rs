@@ -9,7 +9,7 @@ use crate::view::Level;
 use crate::view::View;
 
 const PAGE: &str = include_str!("../../web/report.html");
-const STYLE: &str = include_str!("../../web/style.css");
+const STYLE: &str = concat!(include_str!("../../web/tokens.css"), include_str!("../../web/style.css"));
 const SCRIPT: &str = include_str!("../../web/report.js");
 
 /// The plots of the report and the workbench.

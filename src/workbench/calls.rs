@@ -1,17 +1,18 @@
-//! Verbs that the page calls, and the files that they wrote.
+//! Verbs that the page calls (sketch, plan-next, export), and the files that they wrote.
 
 use super::desk::Desk;
 use super::export::{self, ExportAnswers, Exported};
 use super::record::{self, Job};
-use super::server::{Shared, answer_json, fault, lock, read, refusal, refused, snapshot};
+use super::server::{Shared, answer_json, aside, fault, lock, read, refusal, refused, snapshot};
 use super::session::Refused;
-use super::{Answered, Verb};
+use super::{Answered, Verb, evidence};
 use crate::diag::Failure;
 use axum::body::Bytes;
 use axum::extract::{Path, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::Deserialize;
+use serde_json::json;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
@@ -127,4 +128,33 @@ pub(super) async fn exported_file(State(shared): State<Arc<Shared>>, Path(number
 
 fn none() -> Response {
     refusal(StatusCode::NOT_FOUND, "export", "no compensation has been written yet", Some("write it first"))
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SketchAsked {
+    version: u64,
+}
+
+/// A starting formula for what no known effect explains, as the formula box takes it. Writes nothing.
+pub(super) async fn sketch(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
+    aside(shared, move |shared| {
+        let asked: SketchAsked = match read(&body) {
+            Ok(asked) => asked,
+            Err(response) => return *response,
+        };
+        let now = snapshot(shared);
+        if now.version != asked.version {
+            return refused(Refused::Stale(now.version));
+        }
+        match evidence::sketched(&now) {
+            Ok((draft, says)) => answer_json(json!({ "draft": draft, "says": says }).to_string().into_bytes()),
+            Err(failure) => {
+                let mut answer = refused(Refused::Unusable(failure));
+                *answer.status_mut() = StatusCode::OK;
+                answer
+            }
+        }
+    })
+    .await
 }

@@ -17,6 +17,7 @@ pub mod draft;
 pub mod evidence;
 pub mod export;
 pub mod guard;
+pub mod inputs;
 pub mod pages;
 pub mod recent;
 pub mod record;

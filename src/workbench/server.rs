@@ -225,7 +225,7 @@ pub fn router(shared: Arc<Shared>) -> Router {
         .route("/api/events", get(events))
         .route("/api/step", post(step))
         .route("/api/try", post(try_out))
-        .route("/api/sketch", post(sketch))
+        .route("/api/sketch", post(calls::sketch))
         .route("/api/call", post(calls::call).layer(DefaultBodyLimit::max(LONGEST_CALL)))
         .route("/api/export", get(calls::export_form))
         .route("/api/export/zip", get(calls::exported_zip))
@@ -334,7 +334,7 @@ async fn asset(Path(name): Path<String>) -> Response {
 }
 
 /// Work that takes the session, off the threads that answer.
-async fn aside(shared: Arc<Shared>, work: impl FnOnce(&Shared) -> Response + Send + 'static) -> Response {
+pub(super) async fn aside(shared: Arc<Shared>, work: impl FnOnce(&Shared) -> Response + Send + 'static) -> Response {
     tokio::task::spawn_blocking(move || work(&shared)).await.unwrap_or_else(|_| fault())
 }
 
@@ -352,7 +352,7 @@ async fn state(State(shared): State<Arc<Shared>>) -> Response {
 }
 
 async fn inputs(State(shared): State<Arc<Shared>>) -> Response {
-    aside(shared, |shared| answer_json(record::inputs(&snapshot(shared)))).await
+    aside(shared, |shared| answer_json(super::inputs::inputs(&snapshot(shared)))).await
 }
 
 async fn evidence_of(State(shared): State<Arc<Shared>>) -> Response {
@@ -481,35 +481,6 @@ async fn try_out(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
             // a formula that is not finished yet is an answer and no fault
             Err(why) => {
                 let mut answer = refused(why);
-                *answer.status_mut() = StatusCode::OK;
-                answer
-            }
-        }
-    })
-    .await
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SketchAsked {
-    version: u64,
-}
-
-/// A starting formula for what no known effect explains, as the formula box takes it. Writes nothing.
-async fn sketch(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
-    aside(shared, move |shared| {
-        let asked: SketchAsked = match read(&body) {
-            Ok(asked) => asked,
-            Err(response) => return *response,
-        };
-        let now = snapshot(shared);
-        if now.version != asked.version {
-            return refused(Refused::Stale(now.version));
-        }
-        match evidence::sketched(&now) {
-            Ok((draft, says)) => answer_json(json!({ "draft": draft, "says": says }).to_string().into_bytes()),
-            Err(failure) => {
-                let mut answer = refused(Refused::Unusable(failure));
                 *answer.status_mut() = StatusCode::OK;
                 answer
             }

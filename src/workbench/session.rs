@@ -271,14 +271,8 @@ impl Session {
                 Ok((Edit::Remove(std::slice::from_ref(effect)).text(opened)?, format!("{effect} off")))
             }
             Ask::Model { effects } => {
-                let now = &opened.study.effects;
-                let new: Vec<String> = effects.iter().filter(|e| !now.contains(e)).cloned().collect();
-                let gone: Vec<String> = now.iter().filter(|e| !effects.contains(e)).cloned().collect();
-                // first what is new: a model may not be without effects
-                let with = if new.is_empty() { text } else { Edit::Add(&new).text(opened)? };
-                let signed = |sign: &str, ids: &[String]| ids.iter().map(|e| format!("{sign}{e}")).collect::<Vec<_>>();
-                let says = [signed("+", &new), signed("\u{2212}", &gone)].concat().join(" ");
-                Ok((edit::remove(&with, &gone)?, format!("back to an earlier model: {says}")))
+                let says = format!("back to an earlier model: {}", effects.join(", "));
+                Ok((Edit::Become(effects).text(opened)?, says))
             }
             Ask::Mask { touches, reason } => {
                 every_touch_exists(opened, touches)?;

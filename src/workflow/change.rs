@@ -15,6 +15,8 @@ use std::path::Path;
 pub enum Edit<'a> {
     Add(&'a [String]),
     Remove(&'a [String]),
+    /// These effects and no others.
+    Become(&'a [String]),
 }
 
 impl Edit<'_> {
@@ -31,6 +33,15 @@ impl Edit<'_> {
             Self::Remove(ids) => {
                 ids.iter().try_for_each(|id| nothing_said_of(loaded, id))?;
                 edit::remove(&loaded.text(), ids)
+            }
+            Self::Become(ids) => {
+                let now = &loaded.study.effects;
+                let new: Vec<String> = ids.iter().filter(|id| !now.contains(id)).cloned().collect();
+                let gone: Vec<String> = now.iter().filter(|id| !ids.contains(id)).cloned().collect();
+                new.iter().try_for_each(|id| applies(loaded, id))?;
+                gone.iter().try_for_each(|id| nothing_said_of(loaded, id))?;
+                // first what is new: a model may not be without effects
+                edit::remove(&edit::add(&loaded.text(), &new)?, &gone)
             }
         }
     }

@@ -12,7 +12,7 @@ function token() {
   return given ?? sessionStorage.getItem(TOKEN_KEY) ?? "";
 }
 
-const headers = { "x-axiscal-token": token() };
+export const headers = { "x-axiscal-token": token() };
 
 async function fetched(path, options) {
   try {
@@ -35,7 +35,8 @@ export async function ask(path, body) {
   } catch {
     answer = { messages: [{ message: text || `answer ${response.status}` }] };
   }
-  if (!response.ok) throw { status: response.status, ...answer };
+  // what cannot be tried is an answer as well, with its reason
+  if (!response.ok || answer.error) throw { status: response.status, ...answer };
   return answer;
 }
 

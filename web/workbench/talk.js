@@ -1,48 +1,14 @@
 // Talks with the server, and holds what it has said: `inputs` (touches, effects), `live` (the fit) and `behind` (evidence).
 
+import { ask, headers } from "./ask.js";
 import { listenTogether } from "./events.js";
 import { later, soonest } from "./later.js";
-
-const TOKEN_KEY = "axiscal-token";
-
-function token() {
-  const given = new URLSearchParams(location.hash.slice(1)).get("token");
-  if (given) {
-    sessionStorage.setItem(TOKEN_KEY, given);
-    // out of the address line, so that it is in no bookmark and on no screenshot
-    history.replaceState(null, "", location.pathname);
-  }
-  return given ?? sessionStorage.getItem(TOKEN_KEY) ?? "";
-}
-
-const headers = { "x-axiscal-token": token() };
 
 export const state = { inputs: null, live: null, behind: null, preview: null };
 
 const listeners = { live: [], behind: [], job: [], trouble: [], preview: [] };
 export const on = (what, listener) => listeners[what].push(listener);
 const tell = (what, ...words) => listeners[what].forEach((listener) => listener(...words));
-
-async function ask(path, body) {
-  const options = body === undefined
-    ? { headers }
-    : { method: "POST", headers: { ...headers, "content-type": "application/json" }, body: JSON.stringify(body) };
-  let response;
-  try {
-    response = await fetch(path, options);
-  } catch {
-    throw { messages: [{ message: "the workbench does not answer", help: "is it still running in the terminal?" }] };
-  }
-  const text = await response.text();
-  let answer;
-  try {
-    answer = JSON.parse(text);
-  } catch {
-    answer = { messages: [{ message: text || `answer ${response.status}` }] };
-  }
-  if (!response.ok || answer.error) throw { status: response.status, ...answer };
-  return answer;
-}
 
 /** Puts a new state in the place of the old one; an older one that arrives late is dropped. */
 async function put(live) {

@@ -24,9 +24,10 @@ impl Writer<'_> {
                 let _ = writeln!(text, "- {line}");
             }
         }
-        if !self.post.unverified.is_empty() {
-            let _ = writeln!(text, "\nNot verified on a real control ({})", self.post.unverified.len());
-            for (entry, why) in &self.post.unverified {
+        let unverified = self.unverified();
+        if !unverified.is_empty() {
+            let _ = writeln!(text, "\nNot verified on a real control ({})", unverified.len());
+            for (entry, why) in unverified {
                 let _ = writeln!(text, "- {entry}: {why}");
             }
         }
