@@ -405,7 +405,7 @@ fn with_parts(
         parts.iter().map(|p| Ok(Scene::new(&p.machine, &p.mounting)?.rounded(slack_mm))).collect::<Result<_>>()?;
     let bodies = parts.iter().map(|p| Errorless::new(&p.machine, Some(&p.mounting))).collect();
     let world = Arc::new(World::new(bodies, &machine.origin, tcp));
-    // what may happen is followed where the artefact is at its place
+    // missed touches and interruptions are followed with the artefact at its nominal position
     let only_trunks = against.plan.zip(written).is_some_and(|(plan, written)| plan.touches != written.touches);
     let stage = runs::Stage { machine, post, plan: against.plan, program, world: &world, scenes: &scenes, only_trunks };
     let opening = runs::opening(stage);

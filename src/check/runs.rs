@@ -80,7 +80,7 @@ pub struct Stage<'a> {
     pub world: &'a Arc<World>,
     /// Shapes of each part.
     pub scenes: &'a [Scene<'a>],
-    /// Only the runs in which all is as it should be: what may happen is followed where the artefact is at its place.
+    /// Only the runs without missed touches and interruptions. Those are followed with the artefact at its nominal position.
     pub only_trunks: bool,
 }
 

@@ -21,7 +21,7 @@ const BEYOND_MM: f64 = 0.1;
 /// Sides are touched this far up from the equator, in radii of the path of the ball: the stem of the probe stays off the sphere.
 const UP: f64 = 0.25;
 
-/// Nobody puts an artefact further off by eye, mm.
+/// Largest placement tolerance, mm: more is a set-up mistake.
 pub const MOST_ASTRAY_MM: f64 = 10.0;
 
 /// Can an artefact be put down by eye within this?

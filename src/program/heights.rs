@@ -91,7 +91,7 @@ impl Scene<'_> {
             let highest = obstacle.solid.extent(carrier, &up);
             for (part, solid) in &self.parts {
                 let lowest = -solid.extent(&placed.tool, &-up);
-                let room = room + self.astray_mm(obstacle.role, true);
+                let room = room + self.displacement_mm(obstacle.role, true);
                 let height = (highest + room - lowest) / rise.norm();
                 heights.over_all = heights.over_all.max(height);
                 if *part == Part::Ball && obstacle.role != Role::Fixed {
@@ -152,7 +152,9 @@ impl Scene<'_> {
             let highest = farthest(&chain, &obstacle.solid, &at, &frame, &up, window) + drift(Side::Workpiece);
             let probe = &self.machine.probe;
             lowest - highest
-                >= probe.clearance + probe.placement_tolerance + self.by_eye.map_or(0.0, |by_eye| by_eye.astray_mm)
+                >= probe.clearance
+                    + probe.placement_tolerance
+                    + self.by_eye.map_or(0.0, |by_eye| by_eye.displacement_mm)
         })
     }
 }

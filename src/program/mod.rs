@@ -82,7 +82,7 @@ pub fn generate(machine: &Machine, spec: &ProgramSpec, options: &Options) -> Res
     let inside = by_eye_mm.map(|mm| find::with_reserve(machine, find::farthest_mm(mm)));
     let (whole, machine) = (machine, inside.as_ref().unwrap_or(machine));
     let (layout, mut findings) = layout::lay_out(machine, spec)?;
-    let by_eye = by_eye_mm.map(|mm| scene::ByEye { astray_mm: find::farthest_mm(mm), found: true });
+    let by_eye = by_eye_mm.map(|mm| scene::ByEye { displacement_mm: find::farthest_mm(mm), found: true });
     let scene_of = |p| {
         let parts::Part { machine, mounting, .. }: &parts::Part<'_> = p;
         scene::Scene::new(machine, mounting).map(|scene| scene.put_by_eye(by_eye))
@@ -187,7 +187,7 @@ fn finding<'m>(
         let why = "the program stops for another artefact or stylus, which would have to be found anew";
         return Err(refuse(why, "a program of one artefact and one stylus"));
     };
-    let by_eye = scene::ByEye { astray_mm: find::farthest_mm(tolerance_mm), found: false };
+    let by_eye = scene::ByEye { displacement_mm: find::farthest_mm(tolerance_mm), found: false };
     let unfound = scene::Scene::new(&part.machine, part.mounting)?.put_by_eye(Some(by_eye));
     let touches = find::touches(&unfound, &lift, find::sphere(part.mounting)?, tolerance_mm)?;
     Ok((unfound, touches))

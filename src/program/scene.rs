@@ -198,7 +198,7 @@ pub struct Scene<'m> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ByEye {
     /// How far off it may stand, mm.
-    pub astray_mm: f64,
+    pub displacement_mm: f64,
     /// The moves are relative to it already.
     pub found: bool,
 }
@@ -208,10 +208,10 @@ impl ByEye {
     /// artefact along and not yet the tool: both may be off by as much, in opposite directions.
     fn room_mm(&self, role: Role, at_rapid: bool) -> f64 {
         match role {
-            Role::Fixed => self.astray_mm,
-            Role::Block(_) | Role::Mounted if at_rapid => 2.0 * self.astray_mm,
+            Role::Fixed => self.displacement_mm,
+            Role::Block(_) | Role::Mounted if at_rapid => 2.0 * self.displacement_mm,
             Role::Block(_) | Role::Mounted if self.found => 0.0,
-            Role::Block(_) | Role::Mounted => self.astray_mm,
+            Role::Block(_) | Role::Mounted => self.displacement_mm,
         }
     }
 }
@@ -237,7 +237,7 @@ impl<'m> Scene<'m> {
     }
 
     /// Room for where something stands that was put down by eye, mm.
-    pub(super) fn astray_mm(&self, role: Role, at_rapid: bool) -> f64 {
+    pub(super) fn displacement_mm(&self, role: Role, at_rapid: bool) -> f64 {
         self.by_eye.map_or(0.0, |by_eye| by_eye.room_mm(role, at_rapid))
     }
 
@@ -302,8 +302,8 @@ impl<'m> Scene<'m> {
         let probe = &self.machine.probe;
         let room = probe.clearance + probe.placement_tolerance;
         // what stands on the mounting's own carrier meets the machine's solids as its maker meant it
-        let astray = |o: &Obstacle| o.role != Role::Fixed && o.carrier != 0;
-        for one in self.obstacles.iter().filter(|o| astray(o)) {
+        let displacement = |o: &Obstacle| o.role != Role::Fixed && o.carrier != 0;
+        for one in self.obstacles.iter().filter(|o| displacement(o)) {
             for other in self.obstacles.iter().filter(|o| o.carrier != one.carrier) {
                 if self.least_gap(one, other) < room {
                     return Err(Failure::new(

@@ -88,11 +88,11 @@ impl Scene<'_> {
         };
         // at its contact a search is relative to the block, wherever that stands
         let at_contact = |b: usize| obstacle.role == Role::Block(b) && matches!(part, Part::Ball | Part::Stem);
-        let astray = match manner {
+        let displacement = match manner {
             Manner::ToContact(b) if at_contact(b) => 0.0,
-            _ => self.astray_mm(obstacle.role, manner == Manner::Rapid),
+            _ => self.displacement_mm(obstacle.role, manner == Manner::Rapid),
         };
-        needed.map(|mm| (mm + astray - self.slack_mm).max(0.0))
+        needed.map(|mm| (mm + displacement - self.slack_mm).max(0.0))
     }
 
     /// Proves a straight move of linear axes clear.

@@ -43,7 +43,7 @@ pub fn verify(machine: &Machine, plan: &Plan, path: &Path) -> Result<Vec<Violati
     let inside = plan.find.as_ref().map(|find| with_reserve(machine, farthest_mm(find.tolerance_mm)));
     let machine = inside.as_ref().unwrap_or(machine);
     let by_eye =
-        |found: bool| plan.find.as_ref().map(|find| ByEye { astray_mm: farthest_mm(find.tolerance_mm), found });
+        |found: bool| plan.find.as_ref().map(|find| ByEye { displacement_mm: farthest_mm(find.tolerance_mm), found });
     let parts: Vec<(&String, f64, f64)> = std::iter::once(first).chain(stops).collect();
     let machines = parts.iter().map(|(_, length_mm, radius_mm)| {
         machine.with_stylus_of(*length_mm, *radius_mm).ok_or_else(|| {

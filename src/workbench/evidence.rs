@@ -32,7 +32,7 @@ pub struct Scored {
     pub share: f64,
     pub parameters: Vec<Size>,
     /// What it would take away from the residual of each touch, µm, to first order: for the small picture beside its name.
-    /// Only of the first ones.
+    /// Only the strongest candidates have one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub curve_um: Option<Vec<f64>>,
 }
