@@ -3,7 +3,7 @@
 //! The unknowns are scaled by their columns' norms at the nominal touches; directions that leave no trace there
 //! (singular value below [`RANK_TOLERANCE`] of the largest) are gauges: they are reported, and for each of them one unknown is
 //! held where it stands ([`Observability::hold`]). What is left is a plain problem of full rank: a gauge that bends away from its
-//! straight direction cannot lead the search displacement, because the search never moves along it. Source of the method: Björck,
+//! straight direction cannot mislead the search, because the search never moves along it. Source of the method: Björck,
 //! Numerical Methods for Least Squares Problems, ch. 9.
 
 use nalgebra::{DMatrix, DVector};

@@ -226,11 +226,11 @@ impl<'a> Writer<'a> {
                     .help("number the touches of the plan from 1: 0 means \"all is well\" at the control"));
             }
         }
-        for (n, (entry, why)) in self.unverified().into_iter().enumerate() {
+        for (n, (entry, why)) in self.post.unverified.iter().enumerate() {
             let says = format!("[{entry}] of controller {} was never tried on a real control: {why}", self.post.name);
             let finding = Finding::warning("post::unverified", says);
             // what to do is the same for all of them, and said once
-            let is_last = n + 1 == self.unverified().len();
+            let is_last = n + 1 == self.post.unverified.len();
             let help = "run the program in the control's simulation first, and with the feed override down";
             self.findings.push(if is_last { finding.help(help) } else { finding });
         }
@@ -354,7 +354,7 @@ impl<'a> Writer<'a> {
             head.push(format!("{TOOL_PLACE}: needs {}", tcp.says));
             head.push("all rotary axes must stand at 0 when it starts".to_owned());
         }
-        match self.unverified().len() {
+        match self.post.unverified.len() {
             0 => {}
             n => head.push(format!(
                 "NOT VERIFIED on a real control: {n} {}, see {}. Try the program in the control's simulation first",

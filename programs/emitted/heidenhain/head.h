@@ -23,7 +23,7 @@
 22 ; check the direction of B: at B -90 the ball must be on the +X side of the pivot
 23 ; the first move takes Z straight to 349.000 from where it stands: keep that way free
 24 ; the log is TNC:\AXISCAL\HEAD.LOG
-25 ; NOT VERIFIED on a real control: 37 entries, see head.notes.txt. Try the program in the control's
+25 ; NOT VERIFIED on a real control: 42 entries, see head.notes.txt. Try the program in the control's
 26 ; simulation first
 27 ; the masks HEAD_H.A, _N.A, _P.A, _E.A and AXISCAL_M.A must lie in TNC:\AXISCAL\
 28 ; tilted plane, TCPM and M126 are off after the program; the datum is not touched

@@ -12,20 +12,6 @@ const LINEAR: [AxisName; 3] = [AxisName::X, AxisName::Y, AxisName::Z];
 /// What was found may be further off than the tolerance by this, mm: the contacts are rounded.
 const ROUNDED_MM: f64 = 0.01;
 
-/// Entries of a postprocessor file that only programs which find their artefact use.
-const OF_FINDING: [&str; 4] = ["write.found", "write.shift", "write.find_end", "parts.relative"];
-
-impl<'a> Writer<'a> {
-    /// What was never tried on a real control, of what this program uses: entry and why.
-    pub(super) fn unverified(&self) -> Vec<&'a (String, String)> {
-        let is_used = |entry: &str| {
-            let of_finding = OF_FINDING.contains(&entry) || entry.starts_with("companion {% if find");
-            self.plan.find.is_some() || !of_finding
-        };
-        self.post.unverified.iter().filter(|(entry, _)| is_used(entry)).collect()
-    }
-}
-
 impl Writer<'_> {
     /// A controller whose file does not say how an artefact is found writes no such program.
     pub(super) fn check_find(&self) -> Result<()> {

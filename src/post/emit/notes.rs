@@ -24,10 +24,9 @@ impl Writer<'_> {
                 let _ = writeln!(text, "- {line}");
             }
         }
-        let unverified = self.unverified();
-        if !unverified.is_empty() {
-            let _ = writeln!(text, "\nNot verified on a real control ({})", unverified.len());
-            for (entry, why) in unverified {
+        if !self.post.unverified.is_empty() {
+            let _ = writeln!(text, "\nNot verified on a real control ({})", self.post.unverified.len());
+            for (entry, why) in &self.post.unverified {
                 let _ = writeln!(text, "- {entry}: {why}");
             }
         }
