@@ -80,7 +80,7 @@ mod tests {
             ("head.log", "head.log"),
             ("../../etc/passwd", "etc-passwd"),
             ("C:\\Users\\x\\a b.log", "C--Users-x-a-b.log"),
-            ("<script>\"'.log", "script----.log"),
+            ("<script>\"'.log", "script---.log"),
             (".hidden", "hidden"),
             ("..", "study"),
             ("", "study"),
