@@ -333,6 +333,8 @@ impl LinearisedPlan {
                 whitened = self.whitened(&plain);
                 shape = *given;
             } else if self.kept(&whitened) < KEPT {
+                /// Shares that differ by less are equal.
+                const SAME: f64 = 1e-9;
                 let scanned = effect.parameters.iter().find(|p| !p.scan.is_empty());
                 let mut best = KEPT;
                 // the usual values; where none of them shows it, as in a plan that is over before the first of them, the plan's own
@@ -359,7 +361,8 @@ impl LinearisedPlan {
                     let tried = scaled(&at.values, &which, &at.unknowns);
                     let seen = self.whitened(&tried);
                     let kept = self.kept(&seen);
-                    if kept > best {
+                    // an arm to one side often shows as much as one to the other: rounding is not to choose between them
+                    if kept > best * (1.0 + SAME) {
                         (best, shape, plain, whitened) = (kept, Some(value), tried, seen);
                     }
                 }
