@@ -70,8 +70,7 @@ pub(super) fn put_together(
         .filter(|g| g.members.iter().any(|m| seen.search.scores[m.candidate].p_adjusted < FAMILY_LEVEL))
         .collect();
     let powers = if options.power {
-        let first: Vec<(usize, usize)> = (0..seen.named.effects.len()).map(|c| (c, 0)).collect();
-        let detectable = power::power(&seen.evidence.base, &seen.named.library, &seen.named.raw_um(&first));
+        let detectable = seen.search.power(&|candidate| seen.named.raw_um(&[(candidate, 0)]).swap_remove(0));
         let not_found = detectable.iter().filter(|p| !found.iter().any(|g| g.holds(p.candidate)));
         // how far what would be found is from the usual size: noncentrality goes with the square of the size
         let mut powers: Vec<(f64, Power)> = not_found

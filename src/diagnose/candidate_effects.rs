@@ -1,15 +1,15 @@
 //! The effects that are not in the model, as candidates: columns of the catalogue's rows and of the user's.
 
 use super::evidence::{Evidence, WhiteRows};
-use crate::fit::candidates::{Columns, NoValue, Trials, Variant, with_values};
+use crate::fit::candidates::{NoValue, Variant, columns_at, with_values};
 use crate::fit::{Fit, around, between, scan};
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::Data;
 use crate::model::formula::slot;
 use crate::model::predict::{Model, Observation, Unknown};
+use crate::model::sensitivities::Sensitivities;
 use crate::search::library::Make;
-use crate::search::pattern_tests::Rows;
 use crate::search::{self, Change, Library, Origin, Search};
 use crate::units::um_from_mm;
 use nalgebra::DMatrix;
@@ -53,11 +53,11 @@ pub struct Named<'c> {
     weight: Vec<f64>,
 }
 
-/// All effects on an errorless machine, and the touches: what columns are made of.
+/// All effects on an errorless machine, and what the touches see of them: what columns are made of.
 #[derive(Debug)]
 struct Source {
     model: Model,
-    places: Vec<Observation>,
+    traces: Sensitivities,
     /// Values at which the shape parameters of each effect start.
     starts: Vec<Vec<f64>>,
     rows: Arc<WhiteRows>,
@@ -71,30 +71,37 @@ struct Chosen {
 }
 
 impl Source {
-    /// Sizes of an effect and what they do, mm per typical size.
-    fn columns(&self, trials: &Trials, chosen: Chosen) -> Columns {
+    /// Sizes of an effect.
+    fn sizes(&self, effect: usize) -> impl Iterator<Item = &Unknown> {
+        let instances = self.model.instances(effect).iter();
+        let all = instances.flat_map(|&(first, count)| &self.model.unknowns[first..first + count]);
+        all.filter(|u| !u.shape)
+    }
+
+    /// What the sizes of an effect do at some touches (`None`: at all), mm per typical size.
+    fn columns(&self, chosen: Chosen, touches: Option<&[usize]>) -> DMatrix<f64> {
         let mut shapes = self.starts[chosen.effect].clone();
         if let Some((which, value)) = chosen.shape {
             shapes[which] = value;
         }
-        let mut made = trials.columns(&Variant { effects: vec![chosen.effect], shapes });
+        let variant = Variant { effects: vec![chosen.effect], shapes };
+        let made = columns_at(&self.model, &self.traces, &variant, touches);
         let shaped: Vec<usize> = (0..made.unknowns.len()).filter(|&c| made.unknowns[c].shape).collect();
-        made.values = made.values.remove_columns_at(&shaped);
-        made.unknowns.retain(|u| !u.shape);
-        for (mut values, u) in made.values.column_iter_mut().zip(&made.unknowns) {
+        let mut values = made.values.remove_columns_at(&shaped);
+        for (mut values, u) in values.column_iter_mut().zip(made.unknowns.iter().filter(|u| !u.shape)) {
             values *= typical(u);
         }
-        made
+        values
     }
 
-    /// Columns of some choices, each with the place of a column in it, at some touches; mm per typical size.
-    fn some(&self, wanted: &[(Chosen, usize)], places: &[Observation]) -> DMatrix<f64> {
-        let trials = Trials::new(&self.model, places);
-        let mut out = DMatrix::zeros(places.len(), wanted.len());
+    /// Columns of some choices, each with the place of a column in it, at some touches (`None`: at all); mm per typical size.
+    fn some(&self, wanted: &[(Chosen, usize)], touches: Option<&[usize]>) -> DMatrix<f64> {
+        let n = touches.map_or(self.traces.n_touches(), <[usize]>::len);
+        let mut out = DMatrix::zeros(n, wanted.len());
         let mut at = 0;
         while at < wanted.len() {
             let (chosen, first) = wanted[at];
-            let made = self.columns(&trials, chosen).values;
+            let made = self.columns(chosen, touches);
             // the columns of a choice follow one another
             while at < wanted.len() && wanted[at].1 >= first && wanted[at].0.is(chosen) {
                 out.set_column(at, &made.column(wanted[at].1));
@@ -109,12 +116,9 @@ impl Source {
         let source = self.clone();
         Arc::new(move |numbers, rows| {
             let wanted: Vec<(Chosen, usize)> = numbers.iter().map(|&n| columns[n]).collect();
-            let Some(rows) = rows else { return source.rows.of_mm(source.some(&wanted, &source.places)) };
-            let touches = source.rows.touches_of(rows);
-            let places: Vec<Observation> = touches.iter().map(|&i| source.places[i].clone()).collect();
-            let mm = source.some(&wanted, &places);
-            let value = |touch: usize, column: usize| touches.binary_search(&touch).map_or(0.0, |i| mm[(i, column)]);
-            source.rows.some(rows, wanted.len(), &|touch, column| um_from_mm(value(touch, column)))
+            let Some(rows) = rows else { return source.rows.of_mm(source.some(&wanted, None)) };
+            let (touches, part) = source.rows.part(rows);
+            part.of_mm(source.some(&wanted, Some(&touches)))
         })
     }
 }
@@ -146,9 +150,7 @@ fn scan_of(effect: &Effect, data: &Data) -> Option<(usize, Vec<f64>)> {
 struct Tried {
     /// The value; 0 where nothing is scanned.
     value: f64,
-    /// Its parameters.
-    columns: Vec<Column>,
-    /// What they would do, as rows of the tests; nothing where it is made anew whenever it is needed.
+    /// What its sizes would do, as rows of the tests; nothing where it is made anew whenever it is needed.
     white: DMatrix<f64>,
 }
 
@@ -156,28 +158,35 @@ struct Tried {
 struct Maker<'a> {
     fit: &'a Fit,
     evidence: &'a Evidence,
-    source: &'a Source,
-    trials: Trials<'a>,
+    source: &'a Arc<Source>,
 }
 
 impl Maker<'_> {
     /// Effect number i with its shapes where they start, one of them (by its place among the shapes) at another value.
-    fn make(&self, i: usize, effect: &Effect, scanned: Option<(usize, f64)>) -> Tried {
-        let made = self.source.columns(&self.trials, Chosen { effect: i, shape: scanned });
-        let column = |u: &Unknown| {
-            let bare = u.name.split('@').next().unwrap_or(&u.name);
-            let positive = effect.parameters.iter().any(|p| p.name == bare && p.positive);
-            Column { name: u.name.clone(), unit: u.unit.clone(), typical: typical(u), positive }
+    fn make(&self, i: usize, shape: Option<(usize, f64)>) -> Tried {
+        let white = match Library::keeps(self.evidence.n_rows()) {
+            true => self.evidence.whiten(self.source.columns(Chosen { effect: i, shape }, None)),
+            false => DMatrix::zeros(0, 0),
         };
-        let columns = made.unknowns.iter().map(column).collect();
-        let white = self.evidence.whiten(made.values);
-        Tried { value: scanned.map_or(0.0, |(_, value)| value), columns, white }
+        Tried { value: shape.map_or(0.0, |(_, value)| value), white }
     }
 
-    /// Which of them explains most, and how much.
-    fn best_of(&self, tried: &[Tried]) -> Option<(usize, f64)> {
+    /// Which of the values of effect number i explains most, and how much.
+    fn best_of(&self, (i, which): (usize, usize), tried: &[Tried]) -> Option<(usize, f64)> {
         let mut library = Library::new(self.evidence.n_rows());
-        library.push_scan("tried", Origin::Catalogue, tried.iter().map(|t| (t.value, &t.white)), 1);
+        if Library::keeps(self.evidence.n_rows()) {
+            library.push_scan("tried", Origin::Catalogue, tried.iter().map(|t| (t.value, &t.white)), 1);
+        } else {
+            let n = self.source.sizes(i).count();
+            let chosen = |t: &Tried| {
+                let chosen = Chosen { effect: i, shape: Some((which, t.value)) };
+                (0..n).map(move |k| (chosen, k))
+            };
+            let all: Vec<(Chosen, usize)> = tried.iter().flat_map(chosen).collect();
+            library = Library::made(self.evidence.n_rows(), all.len(), self.source.make(all));
+            let variant = |(k, t): (usize, &Tried)| search::Variant { shape: t.value, columns: k * n..(k + 1) * n };
+            library.place("tried", Origin::Catalogue, tried.iter().enumerate().map(variant).collect(), 1);
+        }
         let score = Search::new(self.evidence.question(), &library).scores.into_iter().next()?;
         Some((score.variant, score.delta_ss))
     }
@@ -187,16 +196,16 @@ impl Maker<'_> {
     /// that another effect seems better.
     fn scan(&self, i: usize, effect: &Effect, (which, values): (usize, Vec<f64>)) -> Vec<Tried> {
         let make_all = |values: &[f64]| -> Vec<Tried> {
-            values.par_iter().map(|value| self.make(i, effect, Some((which, *value)))).collect()
+            values.par_iter().map(|value| self.make(i, Some((which, *value)))).collect()
         };
         let mut kept = make_all(&values);
-        let Some(coarse) = self.best_of(&kept) else { return kept };
+        let Some(coarse) = self.best_of((i, which), &kept) else { return kept };
         let shape = effect.parameters.iter().filter(|p| p.shape.is_some()).nth(which);
         let Some(shape) = shape else { return kept };
         let mut best = (values[coarse.0], coarse.1, None);
         let try_also = |more: &[f64], best: (f64, f64, Option<Tried>)| {
             let mut made = make_all(more);
-            match self.best_of(&made) {
+            match self.best_of((i, which), &made) {
                 Some((at, gain)) if gain > best.1 => (more[at], gain, Some(made.swap_remove(at))),
                 _ => best,
             }
@@ -264,23 +273,21 @@ impl<'c> Named<'c> {
         let (effects, left_out) = with_values(effects, &places);
         let model = Model::new(machine, &effects, &fit.data.set_ups, fit.model.reference);
         let starts = effects.iter().map(|e| starts(e)).collect();
-        let source = Arc::new(Source { model, places, starts, rows: evidence.rows.clone() });
-        let maker = Maker { fit, evidence, source: &source, trials: Trials::new(&source.model, &source.places) };
+        let traces = Sensitivities::new(&model, &places);
+        drop(places);
+        let source = Arc::new(Source { model, traces, starts, rows: evidence.rows.clone() });
+        let maker = Maker { fit, evidence, source: &source };
         let kept = Library::keeps(evidence.n_rows());
         let all_of = |(i, effect): (usize, &&Effect)| {
             let scan = scan_of(effect, &fit.data);
             let which = scan.as_ref().map(|(which, _)| *which);
-            let mut tried = scan.map_or_else(|| vec![maker.make(i, effect, None)], |scan| maker.scan(i, effect, scan));
-            if !kept {
-                tried.iter_mut().for_each(|t| t.white = DMatrix::zeros(0, 0));
-            }
-            (which, tried)
+            (which, scan.map_or_else(|| vec![maker.make(i, None)], |scan| maker.scan(i, effect, scan)))
         };
         let tried: Vec<(Option<usize>, Vec<Tried>)> = effects.par_iter().enumerate().map(all_of).collect();
         drop(maker);
         let chosen = |i: usize, which: Option<usize>, t: &Tried| {
             let chosen = Chosen { effect: i, shape: which.map(|which| (which, t.value)) };
-            (0..t.columns.len()).map(move |k| (chosen, k))
+            (0..source.sizes(i).count()).map(move |k| (chosen, k))
         };
         let each = || tried.iter().enumerate().flat_map(|(i, (which, all))| all.iter().map(move |t| (i, *which, t)));
         let mut library = if kept {
@@ -291,12 +298,16 @@ impl<'c> Named<'c> {
             Library::made(evidence.n_rows(), all.len(), source.make(all))
         };
         let (mut columns, mut scanned, mut at) = (Vec::new(), Vec::new(), 0);
-        for (effect, (which, tried)) in effects.iter().zip(tried) {
-            let own = tried.first().map_or_else(Vec::new, |t| t.columns.clone());
+        for ((i, effect), (which, tried)) in effects.iter().enumerate().zip(tried) {
+            let column = |u: &Unknown| {
+                let positive = effect.parameters.iter().any(|p| p.name == u.own_name() && p.positive);
+                Column { name: u.name.clone(), unit: u.unit.clone(), typical: typical(u), positive }
+            };
+            let own: Vec<Column> = source.sizes(i).map(column).collect();
             let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
             let variant = |t: &Tried| {
-                at += t.columns.len();
-                search::Variant { shape: t.value, columns: at - t.columns.len()..at }
+                at += own.len();
+                search::Variant { shape: t.value, columns: at - own.len()..at }
             };
             library.place(&effect.id, origin, tried.iter().map(variant).collect(), usize::from(which.is_some()));
             library.positive_of_last((0..own.len()).filter(|&k| own[k].positive).collect());
@@ -318,7 +329,6 @@ impl<'c> Named<'c> {
     /// are zero.
     #[must_use]
     pub fn raw_um(&self, wanted: &[(usize, usize)]) -> Vec<DMatrix<f64>> {
-        let trials = Trials::new(&self.source.model, &self.source.places);
         let each = wanted.par_iter().map(|&(candidate, variant)| {
             let effect = self.effects[candidate];
             let value = self.library.candidates()[candidate].variants[variant].shape;
@@ -326,7 +336,7 @@ impl<'c> Named<'c> {
                 .as_ref()
                 .and_then(|s| effect.parameters.iter().filter(|p| p.shape.is_some()).position(|p| p.name == s.name));
             let chosen = Chosen { effect: candidate, shape: which.map(|which| (which, value)) };
-            let mut values = self.source.columns(&trials, chosen).values;
+            let mut values = self.source.columns(chosen, None);
             for mut column in values.column_iter_mut() {
                 column.iter_mut().zip(&self.weight).for_each(|(mm, weight)| *mm = um_from_mm(*mm) * weight);
             }

@@ -43,10 +43,13 @@ pub(super) struct WhiteRows {
 }
 
 impl WhiteRows {
-    /// Observations that whitened rows are made of, in ascending order.
-    pub(super) fn touches_of(&self, rows: &[usize]) -> Vec<usize> {
-        let touches: Vec<usize> = rows.iter().filter_map(|&row| self.used.get(row).copied()).collect();
-        self.whitening.mixed_with(&touches)
+    /// What makes some of the rows, in ascending order, and the observations that they are made of.
+    pub(super) fn part(&self, rows: &[usize]) -> (Vec<usize>, Self) {
+        let own: Vec<usize> = rows.iter().filter_map(|&row| self.used.get(row).copied()).collect();
+        let (touches, whitening) = self.whitening.part(&own);
+        let used = own.iter().filter_map(|touch| touches.binary_search(touch).ok()).collect();
+        // rows of priors see nothing of an effect that is not in the model
+        (touches, Self { whitening, used, n_priors: rows.len() - own.len() })
     }
 
     pub(super) fn of_mm(&self, mut columns_mm: DMatrix<f64>) -> DMatrix<f64> {
@@ -74,11 +77,9 @@ impl Rows for WhiteRows {
         self.of_mm(columns_um)
     }
 
-    fn some(&self, rows: &[usize], columns: usize, um: &dyn Fn(usize, usize) -> f64) -> DMatrix<f64> {
-        // rows of priors see nothing of an effect that is not in the model
-        let touches: Vec<usize> = rows.iter().filter_map(|&row| self.used.get(row).copied()).collect();
-        let white = self.whitening.some(&touches, columns, &|touch, column| mm_from_um(um(touch, column)));
-        if touches.len() == rows.len() { white } else { white.resize_vertically(rows.len(), 0.0) }
+    fn some(&self, rows: &[usize], um: &dyn Fn(&[usize]) -> DMatrix<f64>) -> DMatrix<f64> {
+        let (touches, part) = self.part(rows);
+        part.all(um(&touches))
     }
 }
 

@@ -141,7 +141,7 @@ pub fn examine<'a>(
         Some((evidence, library)) => Search::new(evidence.question(), library),
         None => search.clone(),
     };
-    let nested = held_out(question, &named.library, &evidence.visits, Choice::Redone);
+    let nested = search.held_out(&evidence.visits, Choice::Redone);
     let mut groups = order.groups(at_most);
     let behind = borne_out_behind(&mut groups, &search, &evidence.visits, &nested);
     let given = behind.is_some();

@@ -48,7 +48,7 @@ pub(super) fn columns_of(model: &Model, observations: &[Observation]) -> DMatrix
         left = behind;
     }
     let add = |(first, count, own): (usize, usize, &mut [f64])| {
-        traces.add_columns(first, &start[first..first + count], own);
+        traces.add_columns(model, None, (first, &start[first..first + count]), own);
     };
     each.into_par_iter().for_each(add);
     values
@@ -69,39 +69,41 @@ pub struct Variant {
 #[derive(Debug)]
 pub struct Trials<'a> {
     model: &'a Model,
-    traces: Sensitivities<'a>,
-    start: Vec<f64>,
+    traces: Sensitivities,
 }
 
 impl<'a> Trials<'a> {
     /// Of the effects of a model, at touches.
     #[must_use]
-    pub fn new(model: &'a Model, observations: &'a [Observation]) -> Self {
-        Self { model, traces: Sensitivities::new(model, observations), start: model.start() }
+    pub fn new(model: &'a Model, observations: &[Observation]) -> Self {
+        Self { model, traces: Sensitivities::new(model, observations) }
     }
 
     /// The columns of one choice.
     #[must_use]
     pub fn columns(&self, variant: &Variant) -> Columns {
-        let mut given = variant.shapes.iter();
-        let instances = || variant.effects.iter().flat_map(|&effect| self.model.instances(effect));
-        let n = self.traces.n_touches();
-        let n_columns = instances().map(|(_, count)| count).sum();
-        let mut unknowns = Vec::with_capacity(n_columns);
-        let mut values = DMatrix::zeros(n, n_columns);
-        for &(first, count) in instances() {
-            let own = &self.model.unknowns[first..first + count];
-            let start = own.iter().zip(&self.start[first..]);
-            let shapes: Vec<f64> = start.map(|(u, s)| if u.shape { *given.next().unwrap_or(s) } else { *s }).collect();
-            self.traces.add_columns(
-                first,
-                &shapes,
-                &mut values.as_mut_slice()[unknowns.len() * n..(unknowns.len() + count) * n],
-            );
-            unknowns.extend_from_slice(own);
-        }
-        Columns { unknowns, values }
+        columns_at(self.model, &self.traces, variant, None)
     }
+}
+
+/// The columns of one choice of a model's effects at some touches (`None`: at all).
+#[must_use]
+pub fn columns_at(model: &Model, traces: &Sensitivities, variant: &Variant, touches: Option<&[usize]>) -> Columns {
+    let mut given = variant.shapes.iter();
+    let instances = || variant.effects.iter().flat_map(|&effect| model.instances(effect));
+    let n = touches.map_or(traces.n_touches(), <[usize]>::len);
+    let n_columns = instances().map(|(_, count)| count).sum();
+    let mut unknowns = Vec::with_capacity(n_columns);
+    let mut values = DMatrix::zeros(n, n_columns);
+    for &(first, count) in instances() {
+        let own = &model.unknowns[first..first + count];
+        let value = |u: &Unknown| if u.shape { *given.next().unwrap_or(&u.start) } else { u.start };
+        let shapes: Vec<f64> = own.iter().map(value).collect();
+        let into = &mut values.as_mut_slice()[unknowns.len() * n..(unknowns.len() + count) * n];
+        traces.add_columns(model, touches, (first, &shapes), into);
+        unknowns.extend_from_slice(own);
+    }
+    Columns { unknowns, values }
 }
 
 /// What to do about a formula without a value at some touches.

@@ -6,7 +6,7 @@
 //! block; the Gram matrix is collected per block and spread out at the end.
 
 use super::solve::{Normal, Problem};
-use super::whitening::{Visit, VisitNormals, Whitening};
+use super::whitening::{Visit, VisitNormals, Whitening, normals_of};
 use crate::model::batch::{At, Batch, Scratch};
 use nalgebra::{DMatrix, DMatrixView, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
@@ -200,7 +200,7 @@ impl<'a> Touches<'a> {
             for visit in touches.chunk_by(|&a, &b| self.visits[a] == self.visits[b]) {
                 let normals: Vec<Vector3<f64>> = normals.by_ref().take(visit.len()).collect();
                 let square = normals.iter().fold(Matrix3::zeros(), |sum, n| sum + n * n.transpose());
-                visits.push(Visit { root: self.visit_root(&square), normals });
+                visits.push(Visit { root: self.visit_root(&square), normals: normals_of(&normals) });
             }
         }
         Whitening { root, visits, sigma_mm: self.sigma_mm }

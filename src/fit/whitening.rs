@@ -1,6 +1,6 @@
 //! V^(−1/2) of the touches, made once and applied to any number of columns.
 
-use nalgebra::{DMatrix, DMatrixViewMut, DVectorViewMut, Matrix3, Vector3};
+use nalgebra::{DMatrix, DMatrixViewMut, DVectorViewMut, Dyn, Matrix3, OMatrix, U3, Vector3};
 
 /// What turns columns of gaps (one row per touch, mm or mm per unit) into rows of unit noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,11 +13,18 @@ pub struct Whitening {
     pub(super) sigma_mm: f64,
 }
 
+/// Outward normals in R, each times the root of its weight: one row for each touch.
+pub(super) type Normals = OMatrix<f64, Dyn, U3>;
+
+/// Normals of some touches.
+pub(super) fn normals_of(each: &[Vector3<f64>]) -> Normals {
+    Normals::from_fn(each.len(), |touch, k| each[touch][k])
+}
+
 /// The touches of an index visit.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Visit {
-    /// Outward normals in R, each times the root of its weight.
-    pub normals: Vec<Vector3<f64>>,
+    pub normals: Normals,
     /// K of V^(−1/2) = (I − N·K·Nᵀ)/σ.
     pub root: Matrix3<f64>,
 }
@@ -25,9 +32,8 @@ pub(super) struct Visit {
 impl Visit {
     /// Takes out what the touches of the visit share.
     fn apply(&self, mut part: DVectorViewMut<'_, f64>) {
-        let sum = self.normals.iter().zip(part.iter()).fold(Vector3::zeros(), |s, (n, x)| s + n * *x);
-        let by = self.root * sum;
-        part.iter_mut().zip(&self.normals).for_each(|(x, n)| *x -= n.dot(&by));
+        let by = self.root * self.normals.tr_mul(&part);
+        part.gemv(-1.0, &self.normals, &by, 1.0);
     }
 }
 
@@ -38,63 +44,40 @@ impl Whitening {
         self.apply_to(columns.view_mut((0, 0), (rows, columns.ncols())));
     }
 
-    /// The touches of the visits of some touches, in ascending order as these: whitening mixes them, and no others.
+    /// The whitening of some touches, in ascending order, with the touches that it mixes: those of their visits, and no others.
     #[must_use]
-    pub fn mixed_with(&self, touches: &[usize]) -> Vec<usize> {
-        let mut out = Vec::new();
+    pub fn part(&self, touches: &[usize]) -> (Vec<usize>, Self) {
+        let (mut all, mut visits) = (Vec::new(), Vec::new());
         let (mut place, mut from) = (0, 0);
         for visit in &self.visits {
-            let to = from + visit.normals.len();
+            let to = from + visit.normals.nrows();
             let end = touches.partition_point(|&touch| touch < to).max(place);
             if end > place {
-                out.extend(from..to);
+                all.extend(from..to);
+                visits.push(visit.clone());
             }
             (place, from) = (end, to);
         }
-        out.extend(&touches[place..]);
-        out
-    }
-
-    /// Whitened rows of some touches, in ascending order: `value` is a touch's in a column. What whitening mixes with them are the
-    /// touches of their visits, and no others.
-    pub fn some(&self, touches: &[usize], columns: usize, value: &dyn Fn(usize, usize) -> f64) -> DMatrix<f64> {
-        let mut out = DMatrix::zeros(touches.len(), columns);
-        let mut place = 0;
-        let mut from = 0;
-        for visit in &self.visits {
-            let to = from + visit.normals.len();
-            let own = place..touches.partition_point(|&touch| touch < to).max(place);
-            if !own.is_empty() {
-                let mut part = DMatrix::from_fn(to - from, columns, |i, j| value(from + i, j) * self.root[from + i]);
-                for mut column in part.column_iter_mut() {
-                    visit.apply(column.as_view_mut());
-                }
-                for row in own.clone() {
-                    out.row_mut(row).copy_from(&part.row(touches[row] - from));
-                }
-            }
-            (place, from) = (own.end, to);
-        }
-        for row in place..touches.len() {
-            let touch = touches[row];
-            (0..columns).for_each(|j| out[(row, j)] = value(touch, j) * self.root[touch]);
-        }
-        out.unscale_mut(self.sigma_mm);
-        out
+        all.extend(&touches[place..]);
+        let root = all.iter().filter_map(|&touch| self.root.get(touch).copied()).collect();
+        (all, Self { root, visits, sigma_mm: self.sigma_mm })
     }
 
     /// The same for a part of a matrix.
     pub fn apply_to(&self, mut columns: DMatrixViewMut<'_, f64>) {
+        let weighted = self.root.iter().any(|root| *root != 1.0);
         for mut column in columns.column_iter_mut() {
-            for (x, root) in column.iter_mut().zip(&self.root).filter(|(_, root)| **root != 1.0) {
-                *x *= root;
+            if weighted {
+                column.iter_mut().zip(&self.root).for_each(|(x, root)| *x *= root);
             }
             let mut from = 0;
             for visit in &self.visits {
-                visit.apply(column.rows_mut(from, visit.normals.len()));
-                from += visit.normals.len();
+                visit.apply(column.rows_mut(from, visit.normals.nrows()));
+                from += visit.normals.nrows();
             }
-            column.unscale_mut(self.sigma_mm);
+            if self.sigma_mm != 1.0 {
+                column.unscale_mut(self.sigma_mm);
+            }
         }
     }
 }
@@ -109,7 +92,7 @@ pub struct VisitNormals {
 /// Normals of a visit's touches and the principal axes of their squares.
 #[derive(Debug, Clone)]
 struct Directions {
-    pub normals: Vec<Vector3<f64>>,
+    pub normals: Normals,
     pub squares: Vector3<f64>,
     pub axes: Matrix3<f64>,
 }
@@ -119,10 +102,10 @@ impl VisitNormals {
     pub fn new(visits: &[usize], normals: &[Vector3<f64>], sigma_mm: f64) -> Self {
         let mut at = 0;
         let of = |visit: &[usize]| {
-            let own = normals[at..at + visit.len()].to_vec();
+            let own = &normals[at..at + visit.len()];
             at += visit.len();
             let eigen = own.iter().fold(Matrix3::zeros(), |sum, n| sum + n * n.transpose()).symmetric_eigen();
-            Directions { normals: own, squares: eigen.eigenvalues, axes: eigen.eigenvectors }
+            Directions { normals: normals_of(own), squares: eigen.eigenvalues, axes: eigen.eigenvectors }
         };
         Self { visits: visits.chunk_by(|a, b| a == b).map(of).collect(), sigma_mm }
     }

@@ -63,6 +63,33 @@ pub mod slot {
 /// and the latest stretches in which the spindle ran (`model::spindle`).
 pub type State = [f64; VARIABLES.len()];
 
+/// The variables that some formulas use, each with its values at all touches: a formula that goes through many touches would
+/// fetch whole states for a number or two.
+#[derive(Debug)]
+pub struct States {
+    /// By variable; nothing where no formula uses it.
+    columns: Vec<Vec<f64>>,
+}
+
+impl States {
+    /// What formulas use of the states of all touches.
+    pub fn new<'f, 's>(
+        formulas: impl Iterator<Item = &'f Formula>,
+        states: impl ExactSizeIterator<Item = &'s State>,
+    ) -> Self {
+        let of_state = |o: &Origin| if let Origin::State(i) = o { Some(*i) } else { None };
+        let mut used: Vec<usize> = formulas.flat_map(|f| f.origins().iter().filter_map(of_state)).collect();
+        used.sort_unstable();
+        used.dedup();
+        let mut columns = vec![Vec::new(); VARIABLES.len()];
+        used.iter().for_each(|&i| columns[i].reserve_exact(states.len()));
+        for state in states {
+            used.iter().for_each(|&i| columns[i].push(state[i]));
+        }
+        Self { columns }
+    }
+}
+
 /// Functions that a formula may use.
 pub const FUNCTIONS: [&str; 15] =
     ["sin", "cos", "tan", "asin", "acos", "atan", "atan2", "exp", "ln", "sqrt", "abs", "sign", "floor", "mod", "step"];
@@ -190,18 +217,24 @@ impl Formula {
         }
     }
 
-    /// Values at many states. Touches of one pose mostly follow one another: where the variables are those of the state before,
+    /// Values at many touches. Those of one pose mostly follow one another: where the variables are those of the touch before,
     /// so is the value.
-    pub fn eval_each<'s>(&self, states: impl Iterator<Item = &'s State>, shapes: &[f64]) -> Vec<f64> {
-        let Parts::Expression(expression, origins) = self.parts() else {
-            return states.map(|state| self.eval(state, shapes)).collect();
+    pub fn eval_each(&self, states: &States, touches: impl Iterator<Item = usize>, shapes: &[f64]) -> Vec<f64> {
+        let (expression, origins) = match self.parts() {
+            Parts::Constant(constant) => return touches.map(|_| *constant).collect(),
+            Parts::Expression(expression, origins) => (expression, origins),
         };
+        let column = |origin: &Origin| match origin {
+            Origin::State(i) => Ok(states.columns[*i].as_slice()),
+            Origin::Shape(i) => Err(shapes.get(*i).copied().unwrap_or(f64::NAN)),
+        };
+        let columns: Vec<std::result::Result<&[f64], f64>> = origins.iter().map(column).collect();
         let mut before = [0.0_f64; MOST_VARIABLES];
         let (before, mut last) = (&mut before[..origins.len()], None);
-        let value = |state: &State| {
+        let value = |touch: usize| {
             let mut same = true;
-            for (before, origin) in before.iter_mut().zip(origins) {
-                let value = origin.value(state, shapes);
+            for (before, column) in before.iter_mut().zip(&columns) {
+                let value = column.map_or_else(|number| number, |column| column[touch]);
                 same &= before.to_bits() == value.to_bits();
                 *before = value;
             }
@@ -209,7 +242,7 @@ impl Formula {
             last = Some(value);
             value
         };
-        states.map(value).collect()
+        touches.map(value).collect()
     }
 
     /// Derivatives with respect to the shape parameters that stand inside: (which, value).
@@ -299,12 +332,17 @@ mod tests {
             })
             .to_vec();
         let each: Vec<u64> = states.iter().map(|s| formula.eval(s, &[3.0]).to_bits()).collect();
-        let all: Vec<u64> = formula.eval_each(states.iter(), &[3.0]).into_iter().map(f64::to_bits).collect();
+        let used = States::new(std::iter::once(&formula), states.iter());
+        let all: Vec<u64> = formula.eval_each(&used, 0..6, &[3.0]).into_iter().map(f64::to_bits).collect();
         assert_eq!(all, each);
         assert_ne!(each[1], each[2]);
         // a bare number, and a shape that nobody gave
-        assert_eq!(Formula::parse("2", &[]).unwrap().eval_each(states.iter(), &[]), [2.0; 6]);
-        assert!(formula.eval_each(states.iter(), &[]).iter().all(|v| v.is_nan()));
+        assert_eq!(Formula::parse("2", &[]).unwrap().eval_each(&used, 0..6, &[]), [2.0; 6]);
+        assert!(formula.eval_each(&used, 0..6, &[]).iter().all(|v| v.is_nan()));
+        // some of them, in any order
+        let some: Vec<u64> =
+            formula.eval_each(&used, [4, 2].into_iter(), &[3.0]).into_iter().map(f64::to_bits).collect();
+        assert_eq!(some, [each[4], each[2]]);
     }
 
     #[test]

@@ -146,7 +146,18 @@ impl Active {
     /// Does it act on a touch?
     #[inline]
     pub fn acts_on(&self, touch: &Observation) -> bool {
-        self.is_seen_at(touch.set_up) && self.run.is_none_or(|own| own == touch.run)
+        self.acts_in(touch.set_up, touch.run)
+    }
+
+    /// Does it act on touches of this body in this run?
+    #[inline]
+    pub fn acts_in(&self, set_up: usize, run: usize) -> bool {
+        self.is_seen_at(set_up) && self.run.is_none_or(|own| own == run)
+    }
+
+    /// Does it act on all touches?
+    pub fn acts_everywhere(&self) -> bool {
+        self.set_up.is_none() && self.run.is_none() && self.on.is_empty()
     }
 
     /// Does it act on touches of this body?

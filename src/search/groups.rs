@@ -7,6 +7,7 @@ use super::library::Origin;
 use super::moments::{Block, Moments};
 use super::score::{Search, held_against};
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// A rival explains at least this share of the leader's trace: a leader that is hardly there adds nothing after anything.
 const RIVAL: f64 = 0.5;
@@ -84,21 +85,27 @@ impl Search<'_> {
         let length = direction.norm();
         let unit =
             DMatrix::from_column_slice(direction.len(), 1, (direction / length.max(f64::MIN_POSITIVE)).as_slice());
-        let along_direction = Moments::cross(&unit, self.library);
-        let cross = Moments::cross(&trace.left, self.library);
         let generic = |c: usize| self.library.candidates()[c].origin == Origin::Generic;
-        let mut members: Vec<Member> = among
+        let rivals: Vec<usize> = among.iter().copied().filter(|&j| generic(j) == generic(leader)).collect();
+        let spans: Vec<Range<usize>> = rivals.iter().map(|&j| self.span(j)).collect();
+        // the direction and the trace in one go: columns may have to be made anew
+        let mut both = unit.resize_horizontally(1 + trace.left.ncols(), 0.0);
+        both.columns_mut(1, trace.left.ncols()).copy_from(&trace.left);
+        let cross = Moments::cross(&both, self.library, &spans);
+        let mut at = 0;
+        let mut members: Vec<Member> = rivals
             .iter()
-            .filter(|&&j| generic(j) == generic(leader))
-            .filter_map(|&j| {
-                let span = self.span(j);
+            .zip(&spans)
+            .filter_map(|(&j, span)| {
                 let block = self.block(j);
-                let alignment =
-                    block.whitener.tr_mul(&along_direction.columns(span.0, span.1).transpose()).norm_squared().min(1.0);
+                let (first, own) = (at, cross.columns(at, span.len()));
+                at = first + span.len();
+                let alignment = block.whitener.tr_mul(&own.row(0).transpose()).norm_squared().min(1.0);
                 if j != leader && alignment < RIVAL {
                     return None;
                 }
-                let leader_after_p = if j == leader { 1.0 } else { self.leader_after(&trace, j, &block, &cross) };
+                let on_trace = own.rows(1, own.nrows() - 1).transpose();
+                let leader_after_p = if j == leader { 1.0 } else { self.leader_after(&trace, j, &block, &on_trace) };
                 let alignment = if j == leader { 1.0 } else { alignment };
                 adds_nothing(leader_after_p).then(|| Member {
                     candidate: j,
@@ -126,9 +133,9 @@ impl Search<'_> {
         (behind, m.wrong_sign, score.n_parameters, !m.plausible, origin != Origin::User, score.ln_p)
     }
 
-    fn span(&self, candidate: usize) -> (usize, usize) {
-        let columns = &self.library.candidates()[candidate].variants[self.scores[candidate].variant].columns;
-        (columns.start, columns.len())
+    /// Columns of a candidate's best variant.
+    fn span(&self, candidate: usize) -> Range<usize> {
+        self.library.candidates()[candidate].variants[self.scores[candidate].variant].columns.clone()
     }
 
     /// PJ of a candidate's best variant, with its products.
@@ -137,16 +144,16 @@ impl Search<'_> {
         let raw = columns.tr_mul(&columns);
         let left = self.question.base.project_columns(&columns);
         let gram = left.tr_mul(&left);
-        let residual = self.moments.jr.rows(self.span(candidate).0, columns.ncols()).into_owned();
+        let residual = self.moments.jr.rows(self.span(candidate).start, columns.ncols()).into_owned();
         Trace { raw, gram, residual, left }
     }
 
-    /// p-value of the leader once candidate j is in the model.
-    fn leader_after(&self, leader: &Trace, j: usize, block: &Block, cross: &DMatrix<f64>) -> f64 {
-        let (start, count) = self.span(j);
+    /// p-value of the leader once candidate j is in the model; `on_trace`: JⱼᵀPJ of the leader.
+    fn leader_after(&self, leader: &Trace, j: usize, block: &Block, on_trace: &DMatrix<f64>) -> f64 {
+        let span = self.span(j);
         // UⱼᵀPJ of the leader and Uⱼᵀr
-        let shared = block.whitener.tr_mul(&cross.columns(start, count).transpose());
-        let along = block.whitener.tr_mul(&self.moments.jr.rows(start, count));
+        let shared = block.whitener.tr_mul(on_trace);
+        let along = block.whitener.tr_mul(&self.moments.jr.rows(span.start, span.len()));
         let left = &leader.gram - shared.tr_mul(&shared);
         let after = Block::new(&leader.raw, &left);
         let q = after.rank();

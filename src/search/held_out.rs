@@ -7,10 +7,10 @@
 use super::basis::Basis;
 use super::library::Library;
 use super::moments::{Block, Moments};
-use super::score::{Question, leader, score};
+use super::score::{Question, Search, leader, score};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 /// Touches whose prediction has a variance above this (in variances of a touch) judge nothing.
 pub const LARGEST_VARIANCE: f64 = 9.0;
@@ -117,22 +117,31 @@ pub fn held_out_in(
     choice: Choice,
     colours: &Colours,
 ) -> HeldOut {
-    let moments = Moments::new(question.residual, question.base, library);
-    let residual = question.base.project(question.residual);
-    let first = match choice {
-        Choice::Redone => leader(&score(&moments, library, question.pure), library, false),
-        _ => None,
-    };
-    let mut numbers: Vec<usize> = groups.to_vec();
-    numbers.sort_unstable();
-    numbers.dedup();
-    let results: Vec<Result> = numbers
-        .par_iter()
-        .map(|&group| {
-            let rows: Vec<usize> = (0..groups.len()).filter(|&i| groups[i] == group).collect();
-            fold(question, library, (&moments, &residual), (group, &rows), choice, (colours, first))
-        })
-        .collect();
+    Search::new(question, library).held_out_in(groups, choice, colours)
+}
+
+impl Search<'_> {
+    /// Leaves out each group in turn, errors as they are; see [`held_out_in`].
+    #[must_use]
+    pub fn held_out(&self, groups: &[usize], choice: Choice) -> HeldOut {
+        self.held_out_in(groups, choice, &Colours::default())
+    }
+
+    fn held_out_in(&self, groups: &[usize], choice: Choice, colours: &Colours) -> HeldOut {
+        let residual = self.question.base.project(self.question.residual);
+        let first = if matches!(choice, Choice::Redone) { self.leader() } else { None };
+        let mut rows: BTreeMap<usize, Vec<usize>> = BTreeMap::new();
+        for (row, &group) in groups.iter().enumerate() {
+            rows.entry(group).or_default().push(row);
+        }
+        let of = |(&group, rows): (&usize, &Vec<usize>)| {
+            fold(self.question, self.library, (&self.moments, &residual), (group, rows), choice, (colours, first))
+        };
+        summed(rows.par_iter().map(of).collect(), groups.len())
+    }
+}
+
+fn summed(results: Vec<Result>, touches: usize) -> HeldOut {
     let scored: usize = results.iter().map(|r| r.fold.scored).sum();
     let gain: f64 = results.iter().map(|r| r.fold.gain).sum();
     let before: f64 = results.iter().map(|r| r.before).sum();
@@ -150,7 +159,7 @@ pub fn held_out_in(
         after,
         fall_error: error_of(fall, &|f| f.gain_coloured) / (scored as f64 * (before + after)),
         scored,
-        touches: groups.len(),
+        touches,
         gain,
         standard_error: error_of(gain, &|f| f.gain),
         folds,

@@ -1,10 +1,9 @@
 //! Candidates and their columns, stacked so that one product serves all.
 
 use nalgebra::{DMatrix, DMatrixView, DVectorView};
-use rayon::prelude::*;
 use std::borrow::Borrow;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// A column of less than this, in units of the noise at typical size, is the rounding of a column of nothing.
 const LEAST_TRACE: f64 = 1e-6;
@@ -74,8 +73,9 @@ const CHUNK: usize = 64;
 enum Columns {
     /// In memory, one after the other.
     Kept(Vec<f64>),
-    /// Nowhere: made when they are needed. Those of which nothing is left but rounding are zero.
-    Made { make: Make, numbers: Vec<usize>, nothing: Vec<bool> },
+    /// Nowhere: made when they are needed. Those of which nothing is left but rounding are zero; which these are is known once
+    /// a whole column has been made.
+    Made { make: Make, numbers: Vec<usize>, nothing: Vec<OnceLock<bool>> },
 }
 
 impl std::fmt::Debug for Columns {
@@ -127,17 +127,8 @@ impl Library {
     /// A library of columns that are made when they are needed: many touches have more of them than memory holds.
     #[must_use]
     pub fn made(n_rows: usize, count: usize, make: Make) -> Self {
-        let numbers: Vec<usize> = (0..count).collect();
-        let is_nothing = |column: DVectorView<'_, f64>| column.norm() < LEAST_TRACE;
-        let nothing = numbers
-            .par_chunks(CHUNK)
-            .flat_map_iter(|some| {
-                let columns = make(some, None);
-                let each: Vec<bool> = (0..some.len()).map(|i| is_nothing(columns.column(i))).collect();
-                each
-            })
-            .collect();
-        let part = Part { span: 0..count, columns: Columns::Made { make, numbers, nothing } };
+        let columns = Columns::Made { make, numbers: (0..count).collect(), nothing: vec![OnceLock::new(); count] };
+        let part = Part { span: 0..count, columns };
         Self { n_rows, parts: vec![part], candidates: Vec::new() }
     }
 
@@ -273,8 +264,10 @@ impl Library {
     pub(super) fn chunks(&self) -> Vec<Range<usize>> {
         let mut out: Vec<Range<usize>> = Vec::new();
         let ends = |at: usize| self.parts.iter().any(|part| part.span.start == at);
-        for variant in self.candidates.iter().flat_map(|c| &c.variants) {
-            let span = &variant.columns;
+        let mut spans: Vec<&Range<usize>> =
+            self.candidates.iter().flat_map(|c| &c.variants).map(|v| &v.columns).collect();
+        spans.sort_by_key(|span| span.start);
+        for span in spans {
             match out.last_mut() {
                 Some(last) if last.end == span.start && last.len() < CHUNK && !ends(span.start) => last.end = span.end,
                 _ => out.push(span.clone()),
@@ -334,14 +327,15 @@ impl Library {
     #[must_use]
     pub fn some(&self, wanted: impl Fn(usize) -> bool) -> Self {
         let mut out = Self::new(self.n_rows);
-        for (_, candidate) in self.candidates.iter().enumerate().filter(|(i, _)| wanted(*i)) {
-            let mut own = candidate.clone();
-            for variant in &mut own.variants {
-                variant.columns = out.take(self, &variant.columns);
-            }
-            out.candidates.push(own);
+        let some = self.candidates.iter().enumerate().filter(|(i, _)| wanted(*i));
+        let mut candidates: Vec<Candidate> = some.map(|(_, candidate)| candidate.clone()).collect();
+        // in the order of the columns: neighbours may be made together
+        let mut variants: Vec<&mut Variant> = candidates.iter_mut().flat_map(|c| &mut c.variants).collect();
+        variants.sort_by_key(|variant| variant.columns.start);
+        for variant in variants {
+            variant.columns = out.take(self, &variant.columns);
         }
-        out
+        Self { candidates, ..out }
     }
 
     /// Columns of another library at the end of this one.
@@ -378,10 +372,13 @@ impl Library {
 }
 
 /// Made columns, those of rounding as nothing.
-fn made(make: &Make, numbers: &[usize], nothing: &[bool], rows: Option<&[usize]>) -> DMatrix<f64> {
+fn made(make: &Make, numbers: &[usize], nothing: &[OnceLock<bool>], rows: Option<&[usize]>) -> DMatrix<f64> {
     let mut columns = make(numbers, rows);
-    for (mut column, _) in columns.column_iter_mut().zip(nothing).filter(|(_, nothing)| **nothing) {
-        column.fill(0.0);
+    for (i, mut column) in columns.column_iter_mut().enumerate() {
+        let norm = || if rows.is_none() { column.norm() } else { make(&numbers[i..=i], None).norm() };
+        if *nothing[i].get_or_init(|| norm() < LEAST_TRACE) {
+            column.fill(0.0);
+        }
     }
     columns
 }

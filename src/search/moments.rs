@@ -17,6 +17,15 @@ pub const KEPT: f64 = 1e-3;
 /// What turns rows of a library into those of another regression of the same touches.
 pub type Change<'a> = &'a (dyn Fn(&mut DMatrix<f64>) + Sync);
 
+/// A regression of the touches of a library.
+#[derive(Clone, Copy)]
+pub(super) struct Regression<'a> {
+    pub residual: &'a DVector<f64>,
+    pub base: &'a Basis,
+    /// What makes its rows of the library's.
+    pub change: Option<Change<'a>>,
+}
+
 /// Inner products of a regression and its candidates.
 #[derive(Debug, Clone)]
 pub(super) struct Moments {
@@ -37,63 +46,70 @@ pub(super) struct Moments {
 impl Moments {
     /// Of a residual and a library over a base.
     pub fn new(residual: &DVector<f64>, base: &Basis, library: &Library) -> Self {
-        Self::of(residual, base, library, None)
+        Self::of_each(&[Regression { residual, base, change: None }], library).swap_remove(0)
     }
 
-    /// The same where the residual and the base are of rows that a change makes of the library's.
-    pub fn changed(residual: &DVector<f64>, base: &Basis, library: &Library, change: Change) -> Self {
-        Self::of(residual, base, library, Some(change))
-    }
-
-    fn of(residual: &DVector<f64>, base: &Basis, library: &Library, change: Option<Change>) -> Self {
-        let r = base.project(residual);
-        let variants: Vec<_> =
-            library.candidates().iter().flat_map(|c| &c.variants).map(|v| v.columns.clone()).collect();
-        let of = |span: Range<usize>| {
-            let from = variants.partition_point(|v| v.start < span.start);
-            let own = variants[from..].iter().take_while(|v| v.end <= span.end);
-            library.with(span.clone(), |j| {
-                let changed = change.map(|change| {
-                    let mut own = j.into_owned();
-                    change(&mut own);
-                    own
+    /// The same of several regressions: columns that are in no memory are made once for all of them.
+    pub fn of_each(regressions: &[Regression], library: &Library) -> Vec<Self> {
+        let projected: Vec<DVector<f64>> = regressions.iter().map(|r| r.base.project(r.residual)).collect();
+        let variants = library.candidates().iter().flat_map(|c| &c.variants).map(|v| v.columns.clone());
+        let mut variants: Vec<(usize, Range<usize>)> = variants.enumerate().collect();
+        variants.sort_by_key(|(_, columns)| columns.start);
+        let of = |span: Range<usize>| -> Vec<(Vec<f64>, DMatrix<f64>, Vec<DMatrix<f64>>)> {
+            let from = variants.partition_point(|(_, v)| v.start < span.start);
+            let own = variants[from..].iter().take_while(|(_, v)| v.end <= span.end);
+            library.with(span.clone(), |whole| {
+                let each = regressions.iter().zip(&projected).map(|(regression, r)| {
+                    let changed = regression.change.map(|change| {
+                        let mut own = whole.into_owned();
+                        change(&mut own);
+                        own
+                    });
+                    let j = changed.as_ref().map_or(whole, DMatrix::as_view);
+                    let jr = j.column_iter().map(|column| column.dot(r)).collect();
+                    let blocks = own.clone().map(|(_, v)| block(j.columns(v.start - span.start, v.len()))).collect();
+                    (jr, regression.base.transposed() * j, blocks)
                 });
-                let j = changed.as_ref().map_or(j, DMatrix::as_view);
-                let jr: Vec<f64> = j.column_iter().map(|column| column.dot(&r)).collect();
-                let qj = base.transposed() * j;
-                let blocks: Vec<DMatrix<f64>> = own.map(|v| block(j.columns(v.start - span.start, v.len()))).collect();
-                (jr, qj, blocks)
+                each.collect()
             })
         };
-        let pieces: Vec<_> = library.chunks().into_par_iter().map(of).collect();
-        let (mut jr, mut qj, mut blocks) = (Vec::new(), Vec::new(), Vec::new());
-        for (own_jr, own_qj, own_blocks) in pieces {
-            jr.extend(own_jr);
-            qj.extend_from_slice(own_qj.as_slice());
-            blocks.extend(own_blocks);
+        let empty = |(r, projected): (&Regression, &DVector<f64>)| Self {
+            n: r.residual.len(),
+            p: r.base.rank(),
+            rr: projected.norm_squared(),
+            jr: DVector::zeros(library.n_columns()),
+            qj: DMatrix::zeros(r.base.rank(), library.n_columns()),
+            blocks: vec![DMatrix::zeros(0, 0); variants.len()],
+        };
+        let mut out: Vec<Self> = regressions.iter().zip(&projected).map(empty).collect();
+        let chunks = library.chunks();
+        let pieces: Vec<_> = chunks.par_iter().map(|span| of(span.clone())).collect();
+        let mut at = 0;
+        for (span, each) in chunks.into_iter().zip(pieces) {
+            let from = at;
+            for (moments, (jr, qj, blocks)) in out.iter_mut().zip(each) {
+                at = from + blocks.len();
+                moments.jr.rows_mut(span.start, span.len()).copy_from_slice(&jr);
+                moments.qj.columns_mut(span.start, span.len()).copy_from(&qj);
+                for ((variant, _), block) in variants[from..at].iter().zip(blocks) {
+                    moments.blocks[*variant] = block;
+                }
+            }
         }
-        let (p, columns) = (base.transposed().nrows(), jr.len());
-        Self {
-            n: residual.len(),
-            p: base.rank(),
-            rr: r.norm_squared(),
-            jr: DVector::from_vec(jr),
-            qj: DMatrix::from_vec(p, columns, qj),
-            blocks,
-        }
+        out
     }
 
-    /// MᵀJ for a matrix M of few columns that is already projected: columns of M × columns of the library.
-    pub fn cross(projected: &DMatrix<f64>, library: &Library) -> DMatrix<f64> {
+    /// MᵀJ for a matrix M of few columns that is already projected and some columns of the library, one after the other.
+    pub fn cross(projected: &DMatrix<f64>, library: &Library, spans: &[Range<usize>]) -> DMatrix<f64> {
         let k = projected.ncols();
-        let dots = |span: Range<usize>| -> Vec<f64> {
-            library.with(span, |j| {
+        let dots = |span: &Range<usize>| -> Vec<f64> {
+            library.with(span.clone(), |j| {
                 let each = j.column_iter().map(|column| (0..k).map(move |row| projected.column(row).dot(&column)));
                 each.flatten().collect()
             })
         };
-        let dots: Vec<f64> = library.chunks().into_par_iter().flat_map_iter(dots).collect();
-        DMatrix::from_vec(k, library.n_columns(), dots)
+        let dots: Vec<f64> = spans.par_iter().flat_map_iter(dots).collect();
+        DMatrix::from_vec(k, spans.iter().map(Range::len).sum(), dots)
     }
 
     /// JᵀPJ of a variant in pieces: what its directions are and how much of them is left.

@@ -8,6 +8,8 @@ use super::library::{Library, Origin, Variant};
 use super::shapes::{Function, Grouping};
 use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
+use std::collections::HashMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Highest order of a rotary axis that is looked for.
@@ -206,33 +208,40 @@ pub trait Rows: Send + Sync {
     /// Whitened rows of columns (touches × columns, µm).
     fn all(&self, columns_um: DMatrix<f64>) -> DMatrix<f64>;
 
-    /// Some of them. `um`: a touch's gap in a column.
-    fn some(&self, rows: &[usize], columns: usize, um: &dyn Fn(usize, usize) -> f64) -> DMatrix<f64>;
+    /// Some of them, in ascending order. `um`: the columns at some touches.
+    fn some(&self, rows: &[usize], um: &dyn Fn(&[usize]) -> DMatrix<f64>) -> DMatrix<f64>;
 }
 
 /// All generic shapes of a table, as rows of a regression.
 #[must_use]
 pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
     let planned = planned(features);
-    let n_columns = planned.iter().flat_map(|(_, s, _, _)| &s.functions).map(Vec::len).sum();
-    let made: Vec<(Arc<Shape>, Function)> = planned
-        .iter()
-        .flat_map(|(_, shape, _, _)| {
-            let own = Arc::new(Shape { functions: Vec::new(), ..shape.clone() });
-            shape.functions.iter().flatten().map(move |f| (own.clone(), f.clone()))
-        })
-        .collect();
+    // columns of one function in all directions follow one another: its values are worked out once for all of them
+    let mut ids: HashMap<&str, usize> = HashMap::new();
+    let mut order = Vec::new();
+    for (place, (id, shape, _, _)) in planned.iter().enumerate() {
+        let first = *ids.entry(id).or_insert(place);
+        order.extend((0..shape.functions.len()).map(|variant| (first, variant, place)));
+    }
+    order.sort_unstable();
+    let mut spans: Vec<Vec<Range<usize>>> = planned.iter().map(|(_, s, _, _)| vec![0..0; s.functions.len()]).collect();
+    let mut made: Vec<(Arc<Shape>, Function)> = Vec::new();
+    let bare = |(_, shape, _, _): &Planned| Arc::new(Shape { functions: Vec::new(), ..shape.clone() });
+    let bare: Vec<Arc<Shape>> = planned.iter().map(bare).collect();
+    for (_, variant, place) in order {
+        let own = &planned[place].1.functions[variant];
+        spans[place][variant] = made.len()..made.len() + own.len();
+        made.extend(own.iter().map(|f| (bare[place].clone(), f.clone())));
+    }
+    let n_columns = made.len();
     let (n_rows, n) = (rows.count(), features.directions.first().map_or(0, |d| d.weight.len()));
     let names: Vec<String> = features.directions.iter().map(|d| d.name.clone()).collect();
     let features = features.clone();
     let make = move |numbers: &[usize], at: Option<&[usize]>| -> DMatrix<f64> {
-        let um = |touch: usize, column: usize| {
-            let (shape, function) = &made[numbers[column]];
-            gap(&features, shape, function, touch)
-        };
+        let made = || numbers.iter().map(|&number| &made[number]);
         match at {
-            None => rows.all(DMatrix::from_fn(n, numbers.len(), um)),
-            Some(at) => rows.some(at, numbers.len(), &um),
+            None => rows.all(gaps(&features, made(), 0..n)),
+            Some(at) => rows.some(at, &|touches| gaps(&features, made(), touches.iter().copied())),
         }
     };
     let mut library = if !Library::keeps(n_rows) {
@@ -244,13 +253,9 @@ pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
         pieces.iter().for_each(|piece| data.extend_from_slice(piece.as_slice()));
         Library::kept(n_rows, data)
     };
-    let (mut shapes, mut at) = (Vec::new(), 0);
-    for (id, shape, values, n_scanned) in planned {
-        let variant = |(functions, &value): (&Vec<Function>, &f64)| {
-            at += functions.len();
-            Variant { shape: value, columns: at - functions.len()..at }
-        };
-        let variants = shape.functions.iter().zip(&values).map(variant).collect();
+    let mut shapes = Vec::new();
+    for ((id, shape, values, n_scanned), spans) in planned.into_iter().zip(spans) {
+        let variants = spans.into_iter().zip(values).map(|(columns, shape)| Variant { shape, columns }).collect();
         let direction = shape.direction.map_or("any", |d| names[d].as_str());
         library.place(format!("{id}:{direction}"), Origin::Generic, variants, n_scanned);
         if shape.direction.is_none() {
@@ -261,20 +266,35 @@ pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
     Generics { library, shapes }
 }
 
-/// What a touch sees of one unit of a function, µm.
-fn gap(features: &Features, shape: &Shape, function: &Function, touch: usize) -> f64 {
-    if !shape.variables.iter().all(|&v| features.variables[v].acts_at(touch)) {
-        return 0.0;
+/// What some touches see of one unit of each of some functions, µm.
+fn gaps<'a>(
+    features: &Features,
+    wanted: impl ExactSizeIterator<Item = &'a (Arc<Shape>, Function)>,
+    touches: impl ExactSizeIterator<Item = usize> + Clone,
+) -> DMatrix<f64> {
+    let mut out = DMatrix::zeros(touches.len(), wanted.len());
+    let mut known: Vec<(&Function, Vec<f64>)> = Vec::new();
+    for (mut column, (shape, function)) in out.column_iter_mut().zip(wanted) {
+        let at = known.iter().rposition(|(f, _)| *f == function).unwrap_or_else(|| {
+            known.push((function, touches.clone().map(|touch| function.at_row(features, touch)).collect()));
+            known.len() - 1
+        });
+        let weight = shape.direction.map(|d| &features.directions[d].weight);
+        let partly: Vec<&Variable> =
+            shape.variables.iter().map(|&v| &features.variables[v]).filter(|v| !v.acts.is_empty()).collect();
+        for ((gap, value), touch) in column.iter_mut().zip(&known[at].1).zip(touches.clone()) {
+            let weight = weight.map_or(1.0, |w| w[touch]);
+            if weight != 0.0 && partly.iter().all(|v| v.acts_at(touch)) {
+                *gap = weight * value;
+            }
+        }
     }
-    match shape.direction.map_or(1.0, |d| features.directions[d].weight[touch]) {
-        0.0 => 0.0,
-        weight => weight * function.at_row(features, touch),
-    }
+    out
 }
 
 /// The shapes that are tried.
 fn planned(features: &Features) -> Vec<Planned> {
-    let mut plan = Plan::default();
+    let mut plan = Plan { distinct: features.variables.iter().map(Variable::distinct).collect(), shapes: Vec::new() };
     for (d, direction) in features.directions.iter().enumerate() {
         let along_approach = direction.dof == "r";
         plan.put(format!("shape:{CONSTANT}"), CONSTANT, &[], d, vec![Function::Constant]);
@@ -294,8 +314,9 @@ fn planned(features: &Features) -> Vec<Planned> {
 /// Id without the direction, shape, scanned values, number of scanned parameters.
 type Planned = (String, Shape, Vec<f64>, usize);
 
-#[derive(Default)]
 struct Plan {
+    /// Distinct values of each variable.
+    distinct: Vec<Vec<f64>>,
     shapes: Vec<Planned>,
 }
 
@@ -322,7 +343,7 @@ impl Plan {
     }
 
     fn of_variable(&mut self, d: usize, v: usize, variable: &Variable, along_approach: bool) {
-        let values = variable.distinct();
+        let values = self.distinct[v].clone();
         let (Some(&low), Some(&high)) = (values.first(), values.last()) else { return };
         if values.len() < 2 || variable.values.iter().any(|x| !x.is_finite()) {
             return;
@@ -386,7 +407,7 @@ impl Plan {
 
     fn product(&mut self, d: usize, (v, a): (usize, &Variable), (w, b): (usize, &Variable)) {
         let factors = |index: usize, variable: &Variable| -> Vec<Function> {
-            let values = variable.distinct();
+            let values = &self.distinct[index];
             let (Some(&low), Some(&high)) = (values.first(), values.last()) else { return Vec::new() };
             if values.len() < 2 || variable.values.iter().any(|x| !x.is_finite()) {
                 return Vec::new();
@@ -446,8 +467,9 @@ impl Plan {
                     .collect(),
                 ..clock.clone()
             };
-            let places = thinned(&middles(&own.distinct()), PLACES);
-            self.moved_block(features, time, number, &middles(&own.distinct()));
+            let moments = middles(&own.distinct());
+            let places = thinned(&moments, PLACES);
+            self.moved_block(features, time, number, &moments);
             for d in (0..features.directions.len()).filter(|&d| features.directions[d].at == "workpiece") {
                 let moved = |at: f64| {
                     let after = Function::Step { variable: time, at };
@@ -465,8 +487,7 @@ impl Plan {
 /// axis, and one direction at a time would see a part of it each.
 impl Plan {
     fn jumps(&mut self, features: &Features, time: usize) {
-        let values = features.variables[time].distinct();
-        let places = thinned(&middles(&values), CHANGE_POINTS);
+        let places = thinned(&middles(&self.distinct[time]), CHANGE_POINTS);
         let after = |at: f64| Function::Step { variable: time, at };
         let name = features.variables[time].name.clone();
         self.in_all_directions(features, "machine", format!("shape:{name}-step"), &name, time, &places, &after);

@@ -3,12 +3,13 @@
 use super::basis::Basis;
 use super::library::Library;
 use super::moments::{Block, Moments};
-use super::score::first_variants;
+use super::score::{Search, first_variants};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
+use std::ops::Range;
 
 pub use super::distinguishability::SEEN;
 
@@ -31,10 +32,24 @@ pub struct Power {
     pub at_typical: f64,
 }
 
-/// Power of each candidate's first variant. `raw` has its columns before whitening, in µm.
+/// Power of each candidate's first variant.
 #[must_use]
-pub fn power(base: &Basis, library: &Library, raw: &[DMatrix<f64>]) -> Vec<Power> {
-    let moments = Moments::new(&DVector::zeros(base.n_rows()), base, library);
+pub fn power(base: &Basis, library: &Library, raw: Raw) -> Vec<Power> {
+    of_moments(&Moments::new(&DVector::zeros(base.n_rows()), base, library), library, raw)
+}
+
+impl Search<'_> {
+    /// Power of each candidate's first variant; see [`power`].
+    #[must_use]
+    pub fn power(&self, raw: Raw) -> Vec<Power> {
+        of_moments(&self.moments, self.library, raw)
+    }
+}
+
+/// What makes the columns of a candidate's first variant before whitening, µm.
+pub type Raw<'a> = &'a (dyn Fn(usize) -> DMatrix<f64> + Sync);
+
+fn of_moments(moments: &Moments, library: &Library, raw: Raw) -> Vec<Power> {
     let first = first_variants(library);
     library
         .candidates()
@@ -54,11 +69,12 @@ pub fn power(base: &Basis, library: &Library, raw: &[DMatrix<f64>]) -> Vec<Power
             let count = if span.len() == 1 { 1 } else { DIRECTIONS };
             let mut sizes = Vec::with_capacity(count);
             let mut typical = Vec::with_capacity(count);
+            let raw = raw(c);
             for _ in 0..count {
                 let theta = DVector::from_fn(span.len(), |_, _| -> f64 { StandardNormal.sample(&mut rng) });
                 let theta = if span.len() == 1 { DVector::from_element(1, 1.0) } else { theta.normalize() };
                 let lambda = theta.dot(&(&left * &theta)).max(0.0);
-                let peak = (&raw[c] * &theta).amax();
+                let peak = (&raw * &theta).amax();
                 typical.push(lambda);
                 sizes.push(if lambda > 0.0 { peak * (SEEN / lambda).sqrt() } else { f64::INFINITY });
             }
@@ -85,6 +101,7 @@ fn median(values: &mut [f64]) -> f64 {
 pub fn shares(base: &Basis, library: &Library) -> DMatrix<f64> {
     let blocks = whiteners(base, library);
     let n = blocks.len();
+    let spans: Vec<Range<usize>> = library.candidates().iter().map(|c| c.variants[0].columns.clone()).collect();
     let rows: Vec<Vec<f64>> = (0..n)
         .into_par_iter()
         .map(|a| {
@@ -93,14 +110,14 @@ pub fn shares(base: &Basis, library: &Library) -> DMatrix<f64> {
                 return vec![0.0; n];
             }
             let traces = base.project_columns(&library.columns(a, 0)) * &blocks[a].whitener;
-            let cross = Moments::cross(&traces, library);
-            (0..n)
-                .map(|b| {
-                    let span = &library.candidates()[b].variants[0].columns;
-                    let part = cross.columns(span.start, span.len());
-                    (part * &blocks[b].whitener).norm_squared() / q as f64
-                })
-                .collect()
+            let cross = Moments::cross(&traces, library, &spans);
+            let mut at = 0;
+            let share = |b: usize| {
+                at += spans[b].len();
+                let part = cross.columns(at - spans[b].len(), spans[b].len());
+                (part * &blocks[b].whitener).norm_squared() / q as f64
+            };
+            (0..n).map(share).collect()
         })
         .collect();
     DMatrix::from_fn(n, n, |a, b| rows[a][b])

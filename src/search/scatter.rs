@@ -7,7 +7,7 @@
 
 use super::basis::Basis;
 use super::library::{Library, Origin};
-use super::moments::{Change, KEPT, Moments};
+use super::moments::{Change, KEPT, Moments, Regression};
 use super::multiplicity::{self, FAMILY_LEVEL};
 use super::score::{PureError, Score, family, score};
 use nalgebra::DVector;
@@ -68,8 +68,9 @@ pub fn scatter_that_fits(
         let expected = root_mean_square(&weights(&taus, &deviance), &taus, 0.0);
         let found = Scatter { tests: expected, order: expected };
         let Some(sharpest) = supposed.first().filter(|_| step < at_most) else { return found };
-        let (some, tests) = sensible(&tested(sharpest, library, pure).scores, library);
-        let tested: Vec<Tested> = supposed.par_iter().map(|s| tested(s, &some, pure)).collect();
+        let first = tested(std::slice::from_ref(sharpest), library, pure).swap_remove(0);
+        let (some, tests) = sensible(&first.scores, library);
+        let tested = tested(&supposed, &some, pure);
         let Some(best) = leading(&taus, &tested, &some, &tests).filter(|best| step == 0 || best.passes) else {
             // with nothing in the model tests must not be sure of a scatter that is not
             let bound = root_mean_square(&weights(&taus, &deviance), &taus, 2.0);
@@ -118,9 +119,12 @@ fn root_mean_square(weights: &[f64], taus: &[f64], deviations: f64) -> f64 {
     (square + deviations * mean(&|t| (t - square).powi(2)).sqrt()).sqrt()
 }
 
-fn tested(supposed: &Supposed, library: &Library, pure: Option<PureError>) -> Tested {
-    let moments = Moments::changed(&supposed.residual, &supposed.base, library, supposed.change);
-    Tested { deviance: supposed.ln_det + moments.rr, scores: score(&moments, library, pure) }
+fn tested(supposed: &[Supposed], library: &Library, pure: Option<PureError>) -> Vec<Tested> {
+    let each = supposed.iter().map(|s| Regression { residual: &s.residual, base: &s.base, change: Some(s.change) });
+    let moments = Moments::of_each(&each.collect::<Vec<_>>(), library);
+    let ln_det: Vec<f64> = supposed.iter().map(|s| s.ln_det).collect();
+    let of = |(m, ln_det): (&Moments, &f64)| Tested { deviance: ln_det + m.rr, scores: score(m, library, pure) };
+    moments.par_iter().zip(&ln_det).map(of).collect()
 }
 
 /// A candidate with a variant, and whether it passes its test.

@@ -98,7 +98,7 @@ fn what_the_base_follows_leaves_no_trace() {
     assert_eq!(search.scores.iter().map(|s| s.q).collect::<Vec<_>>(), [0, 0, 1]);
     assert_eq!(search.scores[0].p, 1.0);
     assert_eq!(search.ranking(), [2]);
-    let seen = power(&base, &library, &raw_of(&library, 1.0));
+    let seen = power(&base, &library, &|c| raw_of(&library, 1.0).swap_remove(c));
     assert!(seen[0].minimal_detectable.is_none() && seen[2].minimal_detectable.is_some());
 }
 
@@ -224,7 +224,7 @@ fn minimal_detectable_size_has_noncentrality_25() {
     library.push("one", Origin::Catalogue, &column);
     library.push("two", Origin::Catalogue, &noise_matrix(&mut rng, ROWS, 2));
     // σ = 2 µm: the column in µm is twice the whitened one
-    let seen = power(&base, &library, &raw_of(&library, 2.0));
+    let seen = power(&base, &library, &|c| raw_of(&library, 2.0).swap_remove(c));
     let peak = seen[0].minimal_detectable.unwrap();
     let size = peak / (2.0 * column.amax());
     let trace = base.project(&(column.column(0) * size));
