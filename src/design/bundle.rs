@@ -14,26 +14,14 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 /// Angles of an axis that swivels, deg.
-const SWIVELS_DEG: [f64; 11] = [0.0, -90.0, -75.0, -60.0, -45.0, -30.0, -15.0, 20.0, 45.0, 75.0, 90.0];
+pub const SWIVELS_DEG: [f64; 11] = [0.0, -90.0, -75.0, -60.0, -45.0, -30.0, -15.0, 20.0, 45.0, 75.0, 90.0];
 
 /// The same with those at which most of an artefact is hidden.
-const SWIVELS_WIDE_DEG: [f64; 15] =
+pub const SWIVELS_WIDE_DEG: [f64; 15] =
     [0.0, -90.0, -75.0, -60.0, -45.0, -30.0, -15.0, 20.0, 45.0, 75.0, 90.0, -120.0, 120.0, 150.0, 180.0];
 
 /// Angles of an axis that turns all the way, deg: no common step.
 const TURNS_DEG: [f64; 7] = [0.0, 45.0, 100.0, 160.0, 225.0, 270.0, 310.0];
-
-/// The same with those at which three sides of an upright box can be reached on a tilted table.
-const TURNS_WIDE_DEG: [f64; 9] = [0.0, 45.0, 90.0, 100.0, 160.0, 180.0, 225.0, 270.0, 310.0];
-
-/// Which poses a pool holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Poses {
-    /// Those of a further program.
-    Usual,
-    /// More angles, and each pose approached in both directions.
-    Wide,
-}
 
 /// Points of a face stand at this share of its edges from the centre.
 const SHARE: f64 = 0.3;
@@ -93,9 +81,9 @@ impl Bundle {
 
 /// Every bundle of a mounting that the axes' ranges allow. Collisions are for the program's own proof.
 #[must_use]
-pub fn bundles(machine: &Machine, mounting: &Mounting, poses: Poses) -> Vec<Bundle> {
+pub fn bundles(machine: &Machine, mounting: &Mounting, swivels_deg: &[f64]) -> Vec<Bundle> {
     let mut out = Vec::new();
-    for manner in manners(machine, poses) {
+    for manner in manners(machine, swivels_deg) {
         let with_it = match &manner.stylus {
             None => Some(machine.clone()),
             Some(name) => machine.with_stylus(name),
@@ -114,13 +102,13 @@ pub fn bundles(machine: &Machine, mounting: &Mounting, poses: Poses) -> Vec<Bund
 /// The usual poses of a machine: all angles of each rotary axis within its range with all of the others.
 #[must_use]
 pub fn poses(machine: &Machine) -> Vec<AxisMap> {
-    all_of(&angles(machine, &SWIVELS_DEG, &TURNS_DEG))
+    all_of(&angles(machine, &SWIVELS_DEG))
 }
 
-fn angles(machine: &Machine, swivels_deg: &[f64], turns_deg: &[f64]) -> Vec<(AxisName, Vec<f64>)> {
+fn angles(machine: &Machine, swivels_deg: &[f64]) -> Vec<(AxisName, Vec<f64>)> {
     let of = |axis: &crate::machine::Axis| {
         let [low, high] = axis.range;
-        let angles = if high - low >= 350.0 { turns_deg } else { swivels_deg };
+        let angles: &[f64] = if high - low >= 350.0 { &TURNS_DEG } else { swivels_deg };
         (axis.name, angles.iter().copied().filter(|x| (low..=high).contains(x)).collect())
     };
     machine.rotary().map(of).collect()
@@ -134,21 +122,14 @@ fn all_of(rotary: &[(AxisName, Vec<f64>)]) -> Vec<AxisMap> {
 }
 
 /// Poses and ways to touch: all angles of each axis with all of the other, and the variations of the probe at a few.
-fn manners(machine: &Machine, wanted: Poses) -> Vec<Manner> {
-    let (swivels_deg, turns_deg): (&[f64], &[f64]) = match wanted {
-        Poses::Usual => (&SWIVELS_DEG, &TURNS_DEG),
-        Poses::Wide => (&SWIVELS_WIDE_DEG, &TURNS_WIDE_DEG),
-    };
-    let rotary = angles(machine, swivels_deg, turns_deg);
+fn manners(machine: &Machine, swivels_deg: &[f64]) -> Vec<Manner> {
+    let rotary = angles(machine, swivels_deg);
     let poses = all_of(&rotary);
     let come = |sense: f64| rotary.iter().fold(AxisMap::default(), |m, (name, _)| m.with(*name, sense));
     let feed = machine.probe.slow_feed;
     let plain =
         |pose: &AxisMap| Manner { pose: *pose, from: come(1.0), spindle_deg: 0.0, feed_mm_min: feed, stylus: None };
     let mut out: Vec<Manner> = poses.iter().map(plain).collect();
-    if wanted == Poses::Wide {
-        out.extend(poses.iter().map(|p| Manner { from: come(-1.0), ..plain(p) }));
-    }
     // one axis at a time away from 0: what the probe does differently is seen there already
     let away = |p: &AxisMap| p.iter().filter(|(_, x)| *x != 0.0).count();
     for pose in poses.iter().filter(|p| away(p) <= 1) {
@@ -363,53 +344,16 @@ pub fn as_plan(machine: &Machine, mounting: &Mounting, bundles: &[Bundle], time_
 /// What a choice takes, s: touches, an index for each pose, changes of stylus.
 #[must_use]
 pub fn cost_s(pool: &[Bundle], chosen: &[usize]) -> f64 {
-    cost_at(pool, chosen, &Pace::default())
-}
-
-/// How long a touch and a turn of the rotary axes take, s.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Pace {
-    pub touch_s: f64,
-    pub index_s: f64,
-}
-
-impl Default for Pace {
-    fn default() -> Self {
-        Self { touch_s: TOUCH_S, index_s: INDEX_S }
-    }
-}
-
-impl Pace {
-    /// As a proven program of this machine needs them; none where it has only touches of one kind.
-    #[must_use]
-    pub fn of_plan(touches: &[PlanTouch]) -> Option<Self> {
-        let (mut within, mut between) = ((0.0, 0.0), (0.0, 0.0));
-        for pair in touches.windows(2) {
-            let seconds = pair[1].time_s? - pair[0].time_s?;
-            if pair[0].tool_length_mm == pair[1].tool_length_mm {
-                let sum = if pair[0].visit == pair[1].visit { &mut within } else { &mut between };
-                *sum = (sum.0 + seconds, sum.1 + 1.0);
-            }
-        }
-        let touch_s = within.0 / within.1;
-        let index_s = (between.0 / between.1 - touch_s).max(0.0);
-        (touch_s > 0.0 && index_s.is_finite()).then_some(Self { touch_s, index_s })
-    }
-}
-
-/// The same at a pace of the machine's own.
-#[must_use]
-pub fn cost_at(pool: &[Bundle], chosen: &[usize], pace: &Pace) -> f64 {
     let mut manners: Vec<&Manner> = Vec::new();
     let mut styli: BTreeSet<&str> = BTreeSet::new();
     let mut seconds = 0.0;
     for &i in chosen {
         let b = &pool[i];
         // a feed of its own slows or speeds the measuring stroke only: a touch is mostly way
-        seconds += pace.touch_s * b.touches.len() as f64;
+        seconds += TOUCH_S * b.touches.len() as f64;
         if !manners.contains(&&b.manner) {
             manners.push(&b.manner);
-            seconds += pace.index_s;
+            seconds += INDEX_S;
         }
         styli.extend(b.manner.stylus.as_deref());
     }

@@ -192,10 +192,7 @@ fn find(
         touches.set_weights(masked.iter().map(|m| if *m { 0.0 } else { 1.0 }).collect());
     }
     let first = solve::Problem::normal(&touches, &start, true);
-    let (observability, condition) = {
-        let (weights, noise_mm) = (touches.weights(), touches.noise_mm().0);
-        rank::observe(&first.gram, model, data, &theta, free, priors, (weights, noise_mm))
-    };
+    let (observability, condition) = rank::observe(&first.gram, model, data, &theta, free, priors, touches.weights());
     let mut search =
         OutlierLoop { data, observability: observability.clone(), touches, masked, known, moving, beyond: None };
     let solution = solve::minimise_from(&search.touches, start, &observability, Some(first));

@@ -19,12 +19,10 @@ pub(super) fn observe(
     theta: &[f64],
     free: &[usize],
     priors: &[Prior],
-    (weights, noise_mm): (&[f64], f64),
+    weights: &[f64],
 ) -> (solve::Observability, f64) {
-    // beside large sizes of an effect with a shape what no nominal touch sees may look clear; so may a turn of a round body, which
-    // the rounded numbers of a plan seem to show
-    let no_effect = without_effect(model, free, noise_mm, |c| gram[(c, c)].sqrt());
-    let clear = solve::observe_clearly(gram).filter(|_| !has_shapes(model) && no_effect.is_empty());
+    // beside large sizes of an effect with a shape what no nominal touch sees may look clear
+    let clear = solve::observe_clearly(gram).filter(|_| !has_shapes(model));
     let (seen, nominal) = match clear {
         // nothing is lost, nothing is held
         Some(seen) => (seen, None),
@@ -43,25 +41,10 @@ pub(super) fn observe(
     (seen, condition)
 }
 
-/// An unknown of this many typical sizes …
-const MANY_TYPICAL: f64 = 100.0;
-
-/// … that moves no touch by more than this, mm, has no effect: what seems to show it is the rounding of nominal points and normals.
-const NO_MOVE_MM: f64 = 1e-4;
-
-/// Free columns without an effect. `norm` of a column, whitened with `noise_mm`.
-fn without_effect(model: &Model, free: &[usize], noise_mm: f64, norm: impl Fn(usize) -> f64) -> Vec<usize> {
-    let moves_mm = |c: usize| MANY_TYPICAL * model.unknowns[free[c]].typical.abs() * norm(c) * noise_mm;
-    (0..free.len()).filter(|&c| !model.unknowns[free[c]].shape && moves_mm(c) < NO_MOVE_MM).collect()
-}
-
 /// Has an effect of the model a shape parameter, searched for or held?
 fn has_shapes(model: &Model) -> bool {
     model.unknowns.iter().any(|u| u.shape)
 }
-
-/// Noise for which nominal touches are whitened, mm.
-const NOMINAL_MM: f64 = 1e-3;
 
 /// Rank and null directions at the nominal touches, with the Gram matrix there.
 fn observe_nominal(
@@ -74,7 +57,7 @@ fn observe_nominal(
 ) -> (solve::Observability, DMatrix<f64>) {
     let nominal = model.prepare(&data.nominal);
     let at = |theta: &[f64]| {
-        let mut touches = Touches::new(&nominal, &data.visits, theta.to_vec(), free, priors, (NOMINAL_MM, 0.0));
+        let mut touches = Touches::new(&nominal, &data.visits, theta.to_vec(), free, priors, (1e-3, 0.0));
         if let Some(weights) = weights {
             touches.set_weights(weights.to_vec());
         }
@@ -83,18 +66,9 @@ fn observe_nominal(
     let shapes: Vec<usize> = (0..free.len()).filter(|&c| model.unknowns[free[c]].shape).collect();
     let (mut seen, gram) = if !has_shapes(model) {
         let (touches, at) = at(theta);
-        let mut gram = solve::Problem::normal(&touches, &at, true).gram;
-        let no_effect = without_effect(model, free, NOMINAL_MM, |c| gram[(c, c)].sqrt());
-        for &c in &no_effect {
-            gram.column_mut(c).fill(0.0);
-            gram.row_mut(c).fill(0.0);
-        }
-        let exact = || {
-            let mut jacobian = solve::Problem::jacobian(&touches, &at);
-            no_effect.iter().for_each(|&c| jacobian.column_mut(c).fill(0.0));
-            solve::observe(&jacobian)
-        };
-        let seen = solve::observe_gram(&gram).unwrap_or_else(exact);
+        let gram = solve::Problem::normal(&touches, &at, true).gram;
+        let seen =
+            solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
         (seen, gram)
     } else {
         // a shape needs the sizes of its effect to leave a trace; nothing else does, and beside them a tilt that no touch sees
@@ -185,10 +159,6 @@ pub fn jumps_in_a_design<'e>(effect: &'e Effect, data: &Data) -> Vec<&'e Paramet
 pub fn design_jacobian(touches: &Touches, model: &Model, free: &[usize]) -> DMatrix<f64> {
     let start = DVector::from_iterator(free.len(), free.iter().map(|&i| model.unknowns[i].start));
     let mut jacobian = touches.unwhitened(&start).1;
-    let norms: Vec<f64> = jacobian.column_iter().map(|c| c.norm()).collect();
-    for c in without_effect(model, free, 1.0, |c| norms[c]) {
-        jacobian.column_mut(c).fill(0.0);
-    }
     let shapes: Vec<usize> = (0..free.len()).filter(|&c| model.unknowns[free[c]].shape).collect();
     if !shapes.is_empty() {
         let mut shown = start;

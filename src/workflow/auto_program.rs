@@ -1,9 +1,9 @@
 //! A program that nobody has written: chosen for a machine and what is mounted on it, proven to be reachable.
 
 use super::new::default_effects;
-use crate::design::auto_plan::{Choice, Look, choose};
+use crate::design::auto_plan::{Choice, choose};
 use crate::design::bundle::{
-    Bundle, Head, Pace, Poses, VisitOf, as_plan, bundles, cost_at, program_text, too_narrow, without,
+    Bundle, Head, SWIVELS_WIDE_DEG, VisitOf, as_plan, bundles, program_text, too_narrow, without,
 };
 use crate::design::{LinearisedPlan, Noise, Planned, Task};
 use crate::diag::{Failure, Result, source};
@@ -14,14 +14,11 @@ use crate::program::{self, Generated, Options, ProgramSpec};
 use crate::units::mm_from_um;
 use nalgebra::Vector3;
 
-/// Rounds of choosing, proving and leaving out what cannot be reached …
-const MOST_ROUNDS: usize = 8;
-
-/// … of which the first look for visits that can be reached, and the others choose among those.
-const LOOK_ROUNDS: usize = 4;
+/// Rounds of choosing, proving and leaving out what cannot be reached.
+const MOST_ROUNDS: usize = 6;
 
 /// The program uses at least this share of its time, at most this much more.
-const USED: [f64; 2] = [0.96, 1.02];
+const USED: [f64; 2] = [0.9, 1.02];
 
 /// A result that is known no better than to this part of its typical size is one that the artefact hardly sees.
 const POOR: f64 = 1.0;
@@ -78,35 +75,22 @@ pub fn auto_program(
         let head = Head { by: "generate --program auto", name: "auto", says: &says, again: &choice.again, by_eye_mm };
         program_text(machine, mounting, &head, pool, &choice.chosen)
     };
-    let mut pool = bundles(machine, mounting, Poses::Wide);
+    let mut pool = bundles(machine, mounting, &SWIVELS_WIDE_DEG);
     // what was found with one stylus is not found for another
     pool.retain(|bundle| by_eye_mm.is_none() || bundle.manner.stylus.is_none());
     let mut scale = 1.0;
-    let mut pace = Pace::default();
     let mut best: Option<(f64, String)> = None;
     let mut worst = f64::INFINITY;
     let mut why: Option<Failure> = None;
-    let mut reached: Vec<Bundle> = Vec::new();
-    for round in 0..MOST_ROUNDS {
-        let looking = round < LOOK_ROUNDS;
-        if !looking {
-            pool.retain(|bundle| reached.iter().any(|r| r.is_of(bundle)));
-        }
+    for _ in 0..MOST_ROUNDS {
         if pool.is_empty() {
             break;
         }
-        let choice = choose(
-            &linearised(machine, catalogue, mounting, &pool, budget_s)?,
-            &pool,
-            &pace,
-            budget_s * scale,
-            look_of(round),
-        );
+        let choice = choose(&linearised(machine, catalogue, mounting, &pool, budget_s)?, &pool, budget_s * scale);
         if choice.chosen.is_empty() {
             break;
         }
         worst = worst.min(choice.worst);
-        let chosen_from = pool.clone();
         let mut text = write(&pool, &choice);
         let made = match prove(machine, &text) {
             Ok(made) => made,
@@ -127,33 +111,22 @@ pub fn auto_program(
                 let same = |i: &usize| left.iter().position(|b| b.is_of(&pool[*i]));
                 of.iter().filter_map(same).collect()
             };
-            let kept = Choice {
-                chosen: again(&choice.chosen),
-                again: again(&choice.again),
-                worst: choice.worst,
-                merit: choice.merit,
-            };
+            let kept = Choice { chosen: again(&choice.chosen), again: again(&choice.again), worst: choice.worst };
             if kept.chosen.is_empty() {
                 pool = left;
                 continue;
             }
             text = write(&left, &kept);
-            reached.extend(kept.chosen.iter().map(|&i| left[i].clone()));
             pool = left;
-        } else {
-            reached.extend(choice.chosen.iter().map(|&i| pool[i].clone()));
         }
         let worth = used - 2.0 * lost;
         if used <= USED[1] && best.as_ref().is_none_or(|(w, _)| worth > *w) {
             best = Some((worth, text));
-            if worth >= USED[0] && !looking {
+            if worth >= USED[0] {
                 break;
             }
         }
-        // the next choice counts with the times that this program needs
-        pace = Pace::of_plan(&made.plan.touches).unwrap_or(pace);
-        let foreseen_s: f64 = [&choice.chosen, &choice.again].iter().map(|c| cost_at(&chosen_from, c, &pace)).sum();
-        scale = (foreseen_s * (1.0 - lost) / made.path.seconds * 0.99).clamp(0.05, 20.0);
+        scale = (scale / used * 0.97).clamp(0.05, 20.0);
     }
     let nothing = || {
         if let Some(narrow) = narrow_hole(machine, mounting) {
@@ -186,29 +159,17 @@ fn better_place(
         let by_mm = Vector3::new(foot.x + x - first.centre.x, foot.y + y - first.centre.y, up);
         let mut moved = mounting.clone();
         moved.blocks.iter_mut().for_each(|b| b.centre += by_mm);
-        let pool = bundles(machine, &moved, Poses::Wide);
+        let pool = bundles(machine, &moved, &SWIVELS_WIDE_DEG);
         if pool.is_empty() {
             continue;
         }
-        let there = choose(
-            &linearised(machine, catalogue, &moved, &pool, budget_s)?,
-            &pool,
-            &Pace::default(),
-            budget_s,
-            look_of(0),
-        )
-        .worst;
+        let there = choose(&linearised(machine, catalogue, &moved, &pool, budget_s)?, &pool, budget_s).worst;
         let times = worst / there;
         if times > best.as_ref().map_or(WORTH_MOVING, |b| b.times) {
             best = Some(BetterPlace { by_mm, times, worst });
         }
     }
     Ok(best)
-}
-
-/// How thoroughly a round chooses: the first ones alternate between the two beginnings.
-fn look_of(round: usize) -> Look {
-    if round < LOOK_ROUNDS { Look::Quick(round) } else { Look::Thorough }
 }
 
 /// Why a hole cannot be touched.

@@ -311,26 +311,6 @@ fn results_on_a_part_become_a_plan() {
     assert!(said.contains("poses.csv:1:1") && said.contains("record,A,C"), "{said}");
 }
 
-/// A bore alone determines little: the fit converges to that and says what it leaves open. A turn of the bore about its own axis is
-/// seen only by the rounding of the nominal points.
-#[test]
-fn a_bore_alone_is_fitted_as_far_as_it_goes() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    std::fs::write(at.join("poses.csv"), POSES).unwrap();
-    let file = input("part.txt");
-    ok(at, &["new", "--machine", "trunnion", "--points", &file, "--poses", "poses.csv", "--out", "p.toml"]);
-    let (fit, _) = json(at, &["identify", "p.toml"]);
-    assert_eq!(fit["converged"], true, "{}", fit["stopped"]);
-    assert!(fit["rank"].as_u64() < fit["unknowns"].as_u64());
-    assert_eq!(parameter(&fit, "EX0C")["status"], "undetermined");
-    let combinations = fit["undetermined"].as_array().unwrap();
-    assert!(
-        combinations.iter().any(|c| c["combination"] == serde_json::json!({ "SC@p/part": 1.0 })),
-        "{combinations:?}"
-    );
-}
-
 /// Poses for the user's own cycle: measured and added to the file, they separate what they promise to separate better.
 #[test]
 fn plan_next_proposes_poses_for_centres() {

@@ -1,6 +1,6 @@
 //! Which touches of which blocks: chosen, proven to be reachable, and what they will tell.
 
-use crate::design::bundle::{Bundle, Head, Manner, Poses, VisitOf, as_plan, bundles, program_text, without};
+use crate::design::bundle::{Bundle, Head, Manner, SWIVELS_DEG, VisitOf, as_plan, bundles, program_text, without};
 use crate::design::choose_touches::{Design, Separation, where_all_have_values};
 use crate::design::questions::{Pair, Questions};
 use crate::design::{Known, LinearisedPlan, Noise, Planned, Room, Task};
@@ -190,7 +190,7 @@ impl<'a> Setting<'a> {
         let machine = self.task.machine;
         let nothing = || Failure::new("next::nothing", "nothing can be touched");
         let by_eye_mm = self.by_eye_mm(mounting);
-        let mut pool = bundles(machine, mounting, Poses::Usual);
+        let mut pool = bundles(machine, mounting, &SWIVELS_DEG);
         // what was found with one stylus is not found for another
         pool.retain(|bundle| by_eye_mm.is_none() || bundle.manner.stylus.is_none());
         let mut scale = 1.0;
