@@ -99,20 +99,32 @@ pub fn bundles(machine: &Machine, mounting: &Mounting, swivels_deg: &[f64]) -> V
     out
 }
 
+/// The usual poses of a machine: all angles of each rotary axis within its range with all of the others.
+#[must_use]
+pub fn poses(machine: &Machine) -> Vec<AxisMap> {
+    all_of(&angles(machine, &SWIVELS_DEG))
+}
+
+fn angles(machine: &Machine, swivels_deg: &[f64]) -> Vec<(AxisName, Vec<f64>)> {
+    let of = |axis: &crate::machine::Axis| {
+        let [low, high] = axis.range;
+        let angles: &[f64] = if high - low >= 350.0 { &TURNS_DEG } else { swivels_deg };
+        (axis.name, angles.iter().copied().filter(|x| (low..=high).contains(x)).collect())
+    };
+    machine.rotary().map(of).collect()
+}
+
+fn all_of(rotary: &[(AxisName, Vec<f64>)]) -> Vec<AxisMap> {
+    let none = vec![AxisMap::default()];
+    rotary.iter().fold(none, |poses, (name, angles)| {
+        poses.iter().flat_map(|p| angles.iter().map(|x| p.with(*name, *x))).collect()
+    })
+}
+
 /// Poses and ways to touch: all angles of each axis with all of the other, and the variations of the probe at a few.
 fn manners(machine: &Machine, swivels_deg: &[f64]) -> Vec<Manner> {
-    let rotary: Vec<(AxisName, Vec<f64>)> = machine
-        .rotary()
-        .map(|a| {
-            let [low, high] = a.range;
-            let angles: &[f64] = if high - low >= 350.0 { &TURNS_DEG } else { swivels_deg };
-            (a.name, angles.iter().copied().filter(|x| (low..=high).contains(x)).collect())
-        })
-        .collect();
-    let mut poses = vec![AxisMap::default()];
-    for (name, angles) in &rotary {
-        poses = poses.iter().flat_map(|p| angles.iter().map(|x| p.with(*name, *x))).collect();
-    }
+    let rotary = angles(machine, swivels_deg);
+    let poses = all_of(&rotary);
     let come = |sense: f64| rotary.iter().fold(AxisMap::default(), |m, (name, _)| m.with(*name, sense));
     let feed = machine.probe.slow_feed;
     let plain =
@@ -174,10 +186,7 @@ fn bundle(machine: &Machine, manner: &Manner, block: &Block) -> Bundle {
             bundle.touches.extend(all);
         }
     }
-    // a hole that the ball does not go into is not touched
-    let too_narrow = block.form == Form::Bore
-        && block.diameter.unwrap_or_default() / 2.0 <= machine.probe.ball_radius + machine.probe.clearance;
-    if too_narrow {
+    if too_narrow(machine, block).is_some() {
         return bundle;
     }
     let turned = ring_points::to_carrier(machine, block, SPHERE_IN, &at);
@@ -192,6 +201,13 @@ fn bundle(machine: &Machine, manner: &Manner, block: &Block) -> Bundle {
         }
     }
     bundle
+}
+
+/// The smallest diameter of a hole that the ball goes into with its clearance, mm, where this hole is narrower.
+#[must_use]
+pub fn too_narrow(machine: &Machine, block: &Block) -> Option<f64> {
+    let least_mm = 2.0 * (machine.probe.ball_radius + machine.probe.clearance);
+    (block.form == Form::Bore && block.diameter.unwrap_or_default() <= least_mm).then_some(least_mm)
 }
 
 /// Where a body that is round is touched: the pole first, which finds it.

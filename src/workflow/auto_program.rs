@@ -2,7 +2,9 @@
 
 use super::new::default_effects;
 use crate::design::auto_plan::{Choice, choose};
-use crate::design::bundle::{Bundle, Head, SWIVELS_WIDE_DEG, VisitOf, as_plan, bundles, program_text, without};
+use crate::design::bundle::{
+    Bundle, Head, SWIVELS_WIDE_DEG, VisitOf, as_plan, bundles, program_text, too_narrow, without,
+};
 use crate::design::{LinearisedPlan, Noise, Planned, Task};
 use crate::diag::{Failure, Result, source};
 use crate::fit::effects_of;
@@ -127,6 +129,9 @@ pub fn auto_program(
         scale = (scale / used * 0.97).clamp(0.05, 20.0);
     }
     let nothing = || {
+        if let Some(narrow) = narrow_hole(machine, mounting) {
+            return narrow;
+        }
         why.unwrap_or_else(|| {
             Failure::new("auto::nothing", format!("no program for {:?} fits into {minutes} minutes", mounting.name))
                 .help("more minutes (--minutes), or another place for the artefact")
@@ -165,6 +170,22 @@ fn better_place(
         }
     }
     Ok(best)
+}
+
+/// Why a hole cannot be touched.
+fn narrow_hole(machine: &Machine, mounting: &Mounting) -> Option<Failure> {
+    mounting.blocks.iter().find_map(|block| {
+        let least_mm = too_narrow(machine, block)?;
+        let (hole_mm, tip_mm) = (block.diameter.unwrap_or_default(), 2.0 * machine.probe.ball_radius);
+        let message = format!(
+            "the probe does not go into the hole {:?}: its diameter is {hole_mm} mm, the tip has {tip_mm} mm and keeps {} mm on each \
+             side",
+            block.name, machine.probe.clearance
+        );
+        Some(Failure::new("auto::narrow_hole", message).help(format!(
+            "use a hole of more than {least_mm} mm or a smaller tip (`ball_radius` of [machine.probe] in the machine file)"
+        )))
+    })
 }
 
 fn prove(machine: &Machine, text: &str) -> Result<Generated> {

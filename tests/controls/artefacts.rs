@@ -120,3 +120,20 @@ fn a_machine_is_a_template_and_an_artefact_a_file() {
         );
     }
 }
+
+#[test]
+fn a_hole_that_is_too_narrow_is_refused_with_its_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let ring = ok(at, &["artefacts", "show", "ring"]);
+    let narrow = ring.lines().map(|l| if l.starts_with("diameter") { "diameter = 5.0" } else { l });
+    std::fs::write(at.join("narrow.toml"), narrow.collect::<Vec<_>>().join("\n")).unwrap();
+    let auto = ["--program", "auto", "--artefact", "narrow.toml", "--controller", "linuxcnc", "--out", "job"];
+    let out = axiscal(at, &[&["generate", "--machine", "trunnion"][..], &auto].concat());
+    let said = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(2), "{said}");
+    assert!(
+        said.contains("diameter is 5 mm") && said.contains("tip has 6 mm") && said.contains("more than 6.6 mm"),
+        "{said}"
+    );
+}

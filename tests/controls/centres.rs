@@ -310,3 +310,42 @@ fn results_on_a_part_become_a_plan() {
     let said = refused(at, &[&new[..], &["--out", "r.toml"]].concat());
     assert!(said.contains("poses.csv:1:1") && said.contains("record,A,C"), "{said}");
 }
+
+/// Poses for the user's own cycle: measured and added to the file, they separate what they promise to separate better.
+#[test]
+fn plan_next_proposes_poses_for_centres() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    planted(at);
+    let ask = ["plan-next", "s.toml", "--out", "next", "--effects", "scale-x,scale-y"];
+    let (next, code) = json(at, &ask);
+    assert_eq!(code, 0);
+    let pair = &next["pairs"][0];
+    let (before, after) = (pair["before"].as_f64().unwrap(), pair["after"].as_f64().unwrap());
+    assert!(after > 1.5 * before, "{pair}");
+    let centres = next["centres"].as_array().unwrap();
+    assert!(!centres.is_empty());
+    let csv = std::fs::read_to_string(at.join("next/next-2.csv")).unwrap();
+    assert_eq!(csv.lines().count(), centres.len() + 1);
+    assert!(csv.starts_with("sphere,B,C,X,Y,Z\n"), "{csv}");
+    // the user's cycle: each centre where an errorless machine has it, in the file's coordinates (ball)
+    let mut text = std::fs::read_to_string(input("planted.csv")).unwrap();
+    for c in centres {
+        let of = |k: usize| c["expected_mm"][k].as_f64().unwrap();
+        let angle = |axis: &str| c["pose"][axis].as_f64().unwrap();
+        text += &format!("{},{},{},{},{}\n", angle("B"), angle("C"), of(0), of(1), of(2) - 202.684);
+    }
+    std::fs::write(at.join("more.csv"), text).unwrap();
+    ok(at, &[&["new", "--centres", "more.csv", "--out", "m.toml"][..], &OF_PLANTED].concat());
+    let (fit, _) = json(at, &["identify", "m.toml"]);
+    assert_eq!(fit["touches"], 3 * (16 + centres.len()));
+    for verb in ["diagnose", "plan-next"] {
+        let out: &[&str] = if verb == "plan-next" { &["--out", "again"] } else { &[] };
+        let (_, code) = json(at, &[&[verb, "m.toml"][..], out].concat());
+        assert!(code == 0 || code == 1, "{verb}");
+    }
+    ok(at, &["report", "m.toml", "--out", "report.html"]);
+    // a program needs a controller, poses do not
+    let said = refused(at, &["plan-next", "s.toml", "--out", "next", "--join", "next/next-2.csv"]);
+    assert!(said.contains("--controller"), "{said}");
+}

@@ -17,7 +17,8 @@ pub(super) fn plan_of(log: &Path, out: &Path) -> Option<PathBuf> {
 
 /// Puts the log of the program into the study.
 pub(super) fn join(args: &Args, loaded: &Loaded, plan: &Path, log: &Path, io: &Io) -> Result<Answer> {
-    let run = Join { plan, log, controller: &args.controller, moved: args.moved };
+    let controller = args.controller.as_deref().ok_or_else(super::no_controller)?;
+    let run = Join { plan, log, controller, moved: args.moved };
     let touches = join_run(loaded, &run, io)?;
     let runs = loaded.runs.len() + 1;
     io.say(format!("{}: run {runs} with {touches} touches", args.study.display()));

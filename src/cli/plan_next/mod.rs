@@ -1,15 +1,17 @@
 //! `axiscal plan-next`: the probing program that best separates what the data of a study cannot tell apart.
 
 mod join;
+mod write_centres;
 mod write_program;
 
 use super::{Answer, Io};
-use crate::diag::Result;
+use crate::diag::{Failure, Result};
 use crate::workflow::plan_next::{Advice, Next, NoProgram, Request, plan_next};
 use crate::workflow::{load_controller, load_study};
 use join::{join, plan_of};
 use serde_json::json;
 use std::path::PathBuf;
+use write_centres::write_centres;
 use write_program::write;
 
 #[derive(Debug, clap::Args)]
@@ -19,9 +21,9 @@ pub struct Args {
     /// Folder for the program and its plan
     #[arg(long, short, value_name = "DIR")]
     pub out: PathBuf,
-    /// Name of the controller, or a postprocessor file
+    /// Name of the controller, or a postprocessor file; a study of sphere centres needs none
     #[arg(long, short)]
-    pub controller: String,
+    pub controller: Option<String>,
     /// How long the program may take, minutes (without mounting other blocks)
     #[arg(long, default_value_t = 10.0)]
     pub minutes: f64,
@@ -47,7 +49,8 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if let Some(log) = &args.join {
         return join(args, &loaded, &plan_of(log, &args.out).unwrap_or(plan_file), log, io);
     }
-    let post = load_controller(&args.controller, io)?;
+    // a wrong name is said before the search, not after it
+    let post = args.controller.as_ref().map(|word| load_controller(word, io)).transpose()?;
     let request = Request { minutes: args.minutes, effects: &args.effects, moved: args.moved, name: &name };
     match plan_next(&loaded, &request, io)? {
         Next::NothingConfounded => {
@@ -67,6 +70,14 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             io.answer(&json!({ "format": "axiscal-next/1", "pairs": [], "says": says }));
             Ok(Answer::No)
         }
-        Next::Program(program) => write(args, &loaded, &post, &plan_file, &program, io),
+        Next::Program(program) => {
+            let post = post.ok_or_else(no_controller)?;
+            write(args, &loaded, &post, &plan_file, &program, io)
+        }
+        Next::Centres { questions, poses } => write_centres(args, &name, &questions, &poses, io),
     }
+}
+
+fn no_controller() -> Failure {
+    Failure::new("next::controller", "a program needs a controller").help("name it with --controller")
 }

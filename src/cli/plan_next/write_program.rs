@@ -1,6 +1,7 @@
 //! What was chosen, for the person who waits: the files, and what they will tell.
 
 use super::{Answer, Args, Io};
+use crate::design::choose_touches::Separation;
 use crate::diag::Result;
 use crate::files;
 use crate::post::Postprocessor;
@@ -52,30 +53,7 @@ pub(super) fn write(
         Some(_) => io.say("leave the blocks as the last run left them"),
         None => io.say("put the blocks up first; the time for it is not counted"),
     }
-    let mut t = crate::report::fit::table(&["is it", "or", "separation now", "with these touches", "separated"]);
-    for s in chosen.separations.iter().take(MOST_LISTED) {
-        t.add_row(vec![
-            Cell::new(&s.one),
-            Cell::new(s.other.as_deref().unwrap_or("nothing")),
-            number(significant(s.before)),
-            number(significant(s.after)),
-            number(match s.told {
-                p if p >= SAFELY => format!("yes ({:.0} %)", (100.0 * p).floor()),
-                _ if s.told_if_room_turns.is_some_and(|p| p >= SAFELY) => "if the room turns".to_owned(),
-                p if p >= 0.5 => format!("likely ({:.0} %)", 100.0 * p),
-                p => format!("no ({:.0} %)", 100.0 * p),
-            }),
-        ]);
-    }
-    crate::report::lay::lay(&mut t, io.paper(false).width.min(120), &[]);
-    io.say(io.paper(false).plain(t.to_string()));
-    let told = |limit: f64| chosen.separations.iter().filter(|s| s.told >= limit).count();
-    io.say(format!(
-        "{} of {} pairs will be separated by `diagnose` (with 95 % or more, whichever of the two acts); a separation of 25 or \
-         more is nearly always enough",
-        told(SAFELY),
-        chosen.separations.len()
-    ));
+    say_separations(&chosen.separations, io);
     let turns =
         chosen.separations.iter().filter(|s| s.told < SAFELY && s.told_if_room_turns.is_some_and(|p| p >= SAFELY));
     let turns = match turns.count() {
@@ -107,13 +85,13 @@ pub(super) fn write(
         "when it has run: axiscal plan-next {} --out {} --controller {} {}--join {}\nor by hand:\n\n{}",
         args.study.display(),
         args.out.display(),
-        args.controller,
+        args.controller.as_deref().unwrap_or(&post.name),
         if args.moved { "--moved " } else { "" },
         log.display(),
         entry(
             &relative(plan_file, loaded.folder()),
             &relative(&log, loaded.folder()),
-            &args.controller,
+            args.controller.as_deref().unwrap_or(&post.name),
             chosen.label.as_deref()
         )
     ));
@@ -130,6 +108,34 @@ pub(super) fn write(
         "plan": plan_file.display().to_string(),
     }));
     Ok(Answer::Done)
+}
+
+/// What is separated now, and what will be.
+pub(super) fn say_separations(separations: &[Separation], io: &Io) {
+    let mut t = crate::report::fit::table(&["is it", "or", "separation now", "with these touches", "separated"]);
+    for s in separations.iter().take(MOST_LISTED) {
+        t.add_row(vec![
+            Cell::new(&s.one),
+            Cell::new(s.other.as_deref().unwrap_or("nothing")),
+            number(significant(s.before)),
+            number(significant(s.after)),
+            number(match s.told {
+                p if p >= SAFELY => format!("yes ({:.0} %)", (100.0 * p).floor()),
+                _ if s.told_if_room_turns.is_some_and(|p| p >= SAFELY) => "if the room turns".to_owned(),
+                p if p >= 0.5 => format!("likely ({:.0} %)", 100.0 * p),
+                p => format!("no ({:.0} %)", 100.0 * p),
+            }),
+        ]);
+    }
+    crate::report::lay::lay(&mut t, io.paper(false).width.min(120), &[]);
+    io.say(io.paper(false).plain(t.to_string()));
+    let told = |limit: f64| separations.iter().filter(|s| s.told >= limit).count();
+    io.say(format!(
+        "{} of {} pairs will be separated by `diagnose` (with 95 % or more, whichever of the two acts); a separation of 25 or \
+         more is nearly always enough",
+        told(SAFELY),
+        separations.len()
+    ));
 }
 
 /// The study's table of the run, as a person would write it.

@@ -1,8 +1,10 @@
 //! The probing program that best separates what the data of a study leave open.
 
 mod choose;
+mod poses;
 
 pub use choose::{Chosen, SAFELY};
+pub use poses::{NextCentre, Poses};
 
 use super::history::read_history;
 use super::{Environment, Loaded};
@@ -41,6 +43,11 @@ pub enum Next {
     NothingConfounded,
     NoProgram(NoProgram),
     Program(Box<Program>),
+    /// For a study of sphere centres: poses that the user's own cycle measures.
+    Centres {
+        questions: Questions,
+        poses: Poses,
+    },
 }
 
 /// No program is worth its time.
@@ -101,6 +108,17 @@ pub fn plan_next(loaded: &Loaded, request: &Request, env: &dyn Environment) -> R
     if let Some(bad) = asked_of.left_out.first() {
         return Err(Failure::new("next::no_value", bad.left_out())
             .help("write its formula so that it has a value at every touch, or ask for other effects"));
+    }
+    if let Some(plan) = poses::of_centres(&setting) {
+        let found = poses::choose(&setting, plan, &effects, &questions, 60.0 * request.minutes)?;
+        let better = |p: &Poses| p.separations.iter().any(|s| s.after > GAIN * s.before);
+        return Ok(match found.filter(better) {
+            Some(poses) => Next::Centres { questions, poses },
+            None => Next::NoProgram(NoProgram::new(
+                format!("{}: centres of these spheres at other poses determine it no better", says(&questions)),
+                "measure a sphere at another radius and height, or touch blocks with a program of `generate`",
+            )),
+        });
     }
     let best = best(loaded, &mut setting, &effects, &questions, request, env)?;
     warn(setting.holes.borrow().iter().cloned(), env);
