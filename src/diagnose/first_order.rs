@@ -1,9 +1,12 @@
 //! What a fit would become with further columns in its model, to first order and in its own weights.
 
+use super::candidate_effects::{Named, missing};
 use super::evidence::Evidence;
 use crate::fit::{Fit, uncertainty};
+use crate::machine::Machine;
+use crate::model::catalogue::Catalogue;
 use crate::search::KEPT;
-use crate::units::um_from_mm;
+use crate::units::{mm_from_um, um_from_mm};
 use nalgebra::{DMatrix, DVector};
 
 /// A fit at its minimum, ready to take further columns.
@@ -55,8 +58,8 @@ impl<'f> FirstOrder<'f> {
         Fallen { moves: &self.covariance * self.weights.jacobian.tr_mul(&columns), scale, directions, left }
     }
 
-    /// RMS over the touches that are used with these columns (mm, one row per touch) in the model, µm.
-    pub fn rms_um(&self, raw_mm: &DMatrix<f64>) -> f64 {
+    /// What these columns (mm, one row per touch) in the model change of each residual, mm.
+    fn change_mm(&self, raw_mm: &DMatrix<f64>) -> DVector<f64> {
         let fallen = self.fall(raw_mm);
         let slope = fallen.left.tr_mul(&self.weights.residual).component_div(&fallen.scale);
         let mut sizes = DVector::zeros(raw_mm.ncols());
@@ -64,7 +67,12 @@ impl<'f> FirstOrder<'f> {
             sizes -= vector * (vector.dot(&slope) / value);
         }
         sizes.component_div_assign(&fallen.scale);
-        let change = raw_mm * &sizes - &self.raw_jacobian * (&fallen.moves * &sizes);
+        raw_mm * &sizes - &self.raw_jacobian * (&fallen.moves * &sizes)
+    }
+
+    /// RMS over the touches that are used with these columns (mm, one row per touch) in the model, µm.
+    pub fn rms_um(&self, raw_mm: &DMatrix<f64>) -> f64 {
+        let change = self.change_mm(raw_mm);
         let used = &self.weights.used;
         let sum: f64 = used.iter().map(|&i| (self.fit.residual_mm[i] + change[i]).powi(2)).sum();
         um_from_mm((sum / used.len().max(1) as f64).sqrt())
@@ -81,4 +89,24 @@ impl<'f> FirstOrder<'f> {
         }
         added
     }
+}
+
+/// What one effect in the model would take away from the residual of each touch, µm, by one linear step from a fit; 0 where a touch
+/// is not used. `None` for an effect that is no candidate, or whose shape only the fit itself can find.
+#[must_use]
+pub fn taken_away_um(fit: &Fit, machine: &Machine, catalogue: &Catalogue, effect: &str) -> Option<Vec<f64>> {
+    let effect = missing(fit, machine, catalogue).into_iter().find(|e| e.id == effect)?;
+    if effect.parameters.iter().any(|p| p.shape.is_some()) || fit.n_used() == 0 || fit.dof == 0 {
+        return None;
+    }
+    let linear = FirstOrder::from_fit(fit);
+    let named = Named::with(fit, &linear.weights, machine, vec![effect]);
+    // an effect that has no value at some touches is no candidate
+    if named.effects.is_empty() {
+        return None;
+    }
+    let raw_mm = named.raw_um(&[(0, 0)]).pop()?.map(mm_from_um);
+    let change = linear.change_mm(&raw_mm);
+    let each = change.iter().zip(&fit.weight);
+    Some(each.map(|(mm, weight)| if *weight > 0.0 { -um_from_mm(*mm) } else { 0.0 }).collect())
 }

@@ -49,6 +49,7 @@ use crate::units::um_from_mm;
 pub use answer::Diagnosis;
 use candidate_effects::Named;
 use evidence::Evidence;
+pub use first_order::taken_away_um;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 pub use verdict::Verdict;

@@ -233,6 +233,22 @@ pub fn evidence(behind: &Behind) -> Vec<u8> {
 }
 
 #[derive(Serialize)]
+struct Expected {
+    version: u64,
+    /// What the effect takes away from the residual of each touch, to first order; null where only the fit can say it.
+    curve_um: Option<Vec<f64>>,
+}
+
+/// What the plot may show while an effect is being fitted: one linear step from the present fit.
+#[must_use]
+pub fn expected(now: &Snapshot, effect: &str) -> Vec<u8> {
+    let opened = &*now.opened;
+    let curve = crate::diagnose::taken_away_um(&now.fit, &opened.machine, &opened.catalogue, effect);
+    let curve_um = curve.map(|um| um.into_iter().map(|um| short(um, 1e3)).collect());
+    bytes(&Expected { version: now.version, curve_um })
+}
+
+#[derive(Serialize)]
 struct Tried<'a> {
     version: u64,
     effect: &'a str,

@@ -225,6 +225,7 @@ pub fn router(shared: Arc<Shared>) -> Router {
         .route("/api/events", get(events))
         .route("/api/step", post(step))
         .route("/api/try", post(try_out))
+        .route("/api/expect", post(expect))
         .route("/api/sketch", post(calls::sketch))
         .route("/api/call", post(calls::call).layer(DefaultBodyLimit::max(LONGEST_CALL)))
         .route("/api/export", get(calls::export_form))
@@ -485,6 +486,29 @@ async fn try_out(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
                 answer
             }
         }
+    })
+    .await
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ExpectAsked {
+    version: u64,
+    effect: String,
+}
+
+/// What an effect would leave, to first order: shown until the fit is there.
+async fn expect(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
+    aside(shared, move |shared| {
+        let asked: ExpectAsked = match read(&body) {
+            Ok(asked) => asked,
+            Err(response) => return *response,
+        };
+        let now = snapshot(shared);
+        if now.version != asked.version {
+            return refused(Refused::Stale(now.version));
+        }
+        answer_json(record::expected(&now, &asked.effect))
     })
     .await
 }

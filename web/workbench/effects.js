@@ -1,7 +1,7 @@
 // The candidates, best first: those that these touches cannot separate stand together. Each has its small curve. Below: what is in the model.
 
 import { later, never } from "./later.js";
-import { state, on, setPreview, step, trouble, tryOut } from "./talk.js";
+import { expectation, state, on, setPreview, step, trouble, tryOut } from "./talk.js";
 import { DIRECTIONS, curvePoints, expect, expectNothing, follow, membersOf, onAxis, values, variable } from "./plots.js";
 import { byId, chance, colour, element, show, significant, sized, stated, unitOf } from "./words.js";
 
@@ -30,11 +30,12 @@ function toggle(effect, isOn, disabled) {
   }, isOn ? "Remove" : "Add");
 }
 
-/** Puts an effect into the model, or takes it out; its known curve is what the marks show until it is fitted. */
+/** Puts an effect into the model, or takes it out. What one linear step leaves is what the marks show until it is fitted. */
 export async function switchEffect(id, isOn) {
-  const curve = isOn ? tried.get(id) : null;
+  let curve = isOn ? tried.get(id) : null;
   const began = performance.now();
-  const made = step({ switch: { effect: id, on: isOn } }, () => {
+  const made = step({ switch: { effect: id, on: isOn } }, async () => {
+    if (isOn) curve ??= await expectation(id);
     if (!curve) return;
     expect(curve);
     requestAnimationFrame(() => { window.axiscalExpected = performance.now() - began; });

@@ -43,16 +43,15 @@ export function trouble(error) {
 
 let busy = false;
 
-/** Makes a step: one at a time, each asked of the state that is shown. `meanwhile` is called once it is asked for. */
-export async function step(what, meanwhile = null) {
+/** Makes a step: one at a time, each asked of the state that is shown. `first` is done before it is asked for. */
+export async function step(what, first = null) {
   if (busy || !state.live) return false;
   busy = true;
   const began = performance.now();
   try {
     tell("trouble", null);
-    const asked = ask("/api/step", { version: state.live.version, ask: what });
-    meanwhile?.();
-    const live = await asked;
+    await first?.();
+    const live = await ask("/api/step", { version: state.live.version, ask: what });
     const answered = performance.now();
     await put(live);
     const drawn = performance.now();
@@ -77,6 +76,12 @@ export async function tryOut(what) {
   const found = await ask("/api/try", { version: state.live.version, ...what });
   if (mine === tries && found.version === state.live.version) setPreview(found);
   return found;
+}
+
+/** What an effect takes away from the residual of each touch, µm, to first order; null where only the fit can say it. */
+export async function expectation(effect) {
+  const { curve_um: curve } = await ask("/api/expect", { version: state.live.version, effect });
+  return curve;
 }
 
 /** A starting formula for what no known effect explains. */
