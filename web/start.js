@@ -15,7 +15,16 @@ function trouble(error) {
 }
 
 // ---------------------------------------------------------------- what a file is
-const machinesIn = (text) => [...text.matchAll(/^\s*\[\[machine\]\][^[]*?^\s*name\s*=\s*"((?:[^"\\]|\\.)*)"/gm)].map((m) => m[1]);
+const machinesIn = (text) => [...text.matchAll(/^\s*\[\[machine\]\][^[]*?^\s*name\s*=\s*("(?:[^"\\]|\\.)*")/gm)].map((m) => unquoted(m[1]));
+
+/** A quoted word of TOML, whose escapes are those of JSON. */
+function unquoted(word) {
+  try {
+    return JSON.parse(word);
+  } catch {
+    return word.slice(1, -1);
+  }
+}
 
 function roleOf(name, text) {
   if (/\.json$/i.test(name)) return "plan";

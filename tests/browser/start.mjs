@@ -2,7 +2,7 @@
 
 import { existsSync, mkdirSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { HOSTILE, accessible, equal, holds, measured, noHarm, startPage, watched } from "./tools.mjs";
+import { HOSTILE, accessible, axiscal, equal, holds, measured, noHarm, startPage, watched } from "./tools.mjs";
 
 async function opened(t, name) {
   const folder = join(t.dir, `start ${name}`);
@@ -150,6 +150,34 @@ async function hostileFiles(t) {
   equal(seen.errors, [], "errors in the console");
 }
 
+/** Names that stand inside the files: of the machine, and of an effect of one's own. */
+async function hostileMachine(t) {
+  const made = measured(t.dir, "to-call-names");
+  const text = (file) => readFileSync(join(made, file), "utf8");
+  const { page, seen } = await opened(t, "machine-names");
+  const machines = readFileSync(join(process.env.AXISCAL_ROOT, "machines.toml"), "utf8");
+  // a log names the plan that it belongs to; a CSV of touches does not
+  axiscal("parse", join(made, "head.log"), "--controller", "linuxcnc", "--plan", join(made, "head.plan.json"), "--out", join(made, "head.csv"));
+  const { fields_sha256, ...plan } = { ...JSON.parse(text("head.plan.json")), machine: HOSTILE };
+  const effect = `[[effect]]\nid = "my-square"\nname = ${JSON.stringify(HOSTILE)}\nsays = ${JSON.stringify(HOSTILE)}\nat = "Y"\n`
+    + 'terms = [ { parameter = "mine", unit = "urad", dof = "dx", formula = "-Y", typical = 16 } ]\n';
+  await drop(page, [
+    ["head.plan.json", JSON.stringify(plan)], ["head.csv", text("head.csv")], ["effects.toml", effect],
+    ["machines.toml", machines.replace('name = "swivel-head"', `name = ${JSON.stringify(HOSTILE)}`)],
+  ]);
+  await noHarm(page);
+  equal(await page.inputValue("#machine"), HOSTILE, "the machine of the file");
+  holds((await page.textContent("#machine")).includes(HOSTILE), "the machine's name is not shown");
+  await page.fill("#name", "names");
+  await page.click("#make");
+  await page.waitForFunction(() => document.body.dataset.version || document.querySelector("#messages")?.textContent.length > 0, null, { timeout: 120_000 });
+  equal((await page.locator("#messages").allTextContents()).join(""), "", "what was refused");
+  await isOpen(page);
+  await noHarm(page);
+  holds((await page.textContent("body")).includes(HOSTILE), "the machine's name is not shown on the workbench");
+  equal(seen.errors, [], "errors in the console");
+}
+
 async function demo(t) {
   const { folder, page, seen } = await opened(t, "demo");
   await page.click("#demo");
@@ -163,5 +191,6 @@ export const startCases = [
   ["start_refused_files", refused],
   ["start_centres_by_keyboard", centresByKeyboard],
   ["start_hostile_names", hostileFiles],
+  ["start_hostile_machine", hostileMachine],
   ["start_demo", demo],
 ];
