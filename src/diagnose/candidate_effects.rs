@@ -284,7 +284,6 @@ impl<'c> Named<'c> {
             (which, scan.map_or_else(|| vec![maker.make(i, None)], |scan| maker.scan(i, effect, scan)))
         };
         let tried: Vec<(Option<usize>, Vec<Tried>)> = effects.par_iter().enumerate().map(all_of).collect();
-        drop(maker);
         let chosen = |i: usize, which: Option<usize>, t: &Tried| {
             let chosen = Chosen { effect: i, shape: which.map(|which| (which, t.value)) };
             (0..source.sizes(i).count()).map(move |k| (chosen, k))

@@ -26,6 +26,9 @@ pub(super) struct Regression<'a> {
     pub change: Option<Change<'a>>,
 }
 
+/// Jᵀr and QᵀJ of some columns of a library, and JᵀJ of each variant among them.
+type Piece = (Vec<f64>, DMatrix<f64>, Vec<DMatrix<f64>>);
+
 /// Inner products of a regression and its candidates.
 #[derive(Debug, Clone)]
 pub(super) struct Moments {
@@ -55,7 +58,7 @@ impl Moments {
         let variants = library.candidates().iter().flat_map(|c| &c.variants).map(|v| v.columns.clone());
         let mut variants: Vec<(usize, Range<usize>)> = variants.enumerate().collect();
         variants.sort_by_key(|(_, columns)| columns.start);
-        let of = |span: Range<usize>| -> Vec<(Vec<f64>, DMatrix<f64>, Vec<DMatrix<f64>>)> {
+        let of = |span: Range<usize>| -> Vec<Piece> {
             let from = variants.partition_point(|(_, v)| v.start < span.start);
             let own = variants[from..].iter().take_while(|(_, v)| v.end <= span.end);
             library.with(span.clone(), |whole| {
