@@ -170,12 +170,13 @@ globalThis.axiscalPlots = (() => {
     ];
     const all = view.ladder.flatMap((r) => [r.rms_um, r.held_out_rms_um]).filter((v) => v > 0).concat(noise);
     const wide = Math.max(...all) / Math.min(...all) > 12;
+    const small = narrow(el, 450);
     const lay = layout(el, {
-      showlegend: true, legend: { orientation: 'h', y: 1.02, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 30, t: 44, b: 44 },
-      xaxis: { tickvals: x, ticktext: names, range: [-0.35, x.length - 0.45], zeroline: false, title: { text: 'model, step by step' } },
-      yaxis: { title: { text: narrow(el, 450) ? 'RMS, µm' : 'remaining error (RMS), µm' }, ...(wide ? { type: 'log', tickvals: [-3, -2, -1, 0, 1, 2, 3].flatMap((k) => [1, 2, 5].map((f) => Number((f * 10 ** k).toPrecision(3)))), range: [Math.log10(0.6 * Math.min(...all)), Math.log10(1.8 * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
+      showlegend: true, legend: { orientation: 'h', y: 1.02, yanchor: 'bottom', x: 0 }, margin: { l: 8, r: 30, t: small ? 34 : 44, b: 44 },
+      xaxis: { tickvals: x, ticktext: names, range: [-0.35, x.length - 0.45], zeroline: false, ...(small ? { tickfont: { size: 10 } } : {}), title: { text: 'model, step by step' } },
+      yaxis: { title: { text: small ? 'RMS, µm' : 'remaining error (RMS), µm' }, ...(wide ? { type: 'log', tickvals: [-3, -2, -1, 0, 1, 2, 3].flatMap((k) => (small ? [1] : [1, 2, 5]).map((f) => Number((f * 10 ** k).toPrecision(3)))), range: [Math.log10(0.6 * Math.min(...all)), Math.log10((small ? 3 : 1.8) * Math.max(...all))] } : { range: [0, 1.15 * Math.max(...all)] }) },
       shapes: [{ type: 'line', x0: 0, x1: 1, xref: 'paper', y0: noise, y1: noise, line: { color: c.ink, width: 2, dash: 'dash' } }],
-      annotations: [{ x: 0, xref: 'paper', xanchor: 'left', xshift: 4, y: wide ? Math.log10(noise) : noise, yanchor: 'bottom', bgcolor: c.paper, borderpad: 1, yshift: 2, showarrow: false, text: `probe noise ${digits(noise)} µm` }],
+      annotations: [{ x: 0, xref: 'paper', xanchor: 'left', xshift: 4, y: wide ? Math.log10(noise) : noise, yanchor: 'top', yshift: -2, showarrow: false, text: `probe noise ${digits(noise)} µm`, font: { size: small ? 10 : 12 } }],
     });
     return draw(el, traces, lay, `Remaining error of each model: ${view.ladder.map((r) => `${r.label} ${digits(r.rms_um)} µm`).join(', ')}; the probe noise is ${digits(noise)} µm.`);
   }
@@ -428,7 +429,7 @@ globalThis.axiscalPlots = (() => {
       traces.push(lines([a.line], { color: c.ink, width: flat ? 1.5 : 3, dash: a.rotary ? 'dashdot' : 'solid' }), word(`<b>${a.name}</b>`, a.line[1]));
     }
     traces.push(lines([parts.scale.line], { color: c.ink, width: flat ? 4 : 8 }), word(`${digits(parts.scale.um, 1)} µm`, parts.scale.line[1]));
-    const common = { margin: { l: 0, r: 0, t: 4, b: 4 }, showlegend: true, legend: { title: { text: 'stage (click hides)' }, x: 0, y: 1, bgcolor: 'rgba(0,0,0,0)' } };
+    const common = { margin: { l: 0, r: 0, t: 4, b: 4 }, showlegend: true, legend: { title: { text: document.documentElement.classList.contains('printing') ? 'stage' : 'stage (click hides)' }, x: 0, y: 1, bgcolor: 'rgba(0,0,0,0)' } };
     const off = { visible: false, showgrid: false, zeroline: false };
     const side = (title) => ({ title: { text: title }, color: c.ink, gridcolor: c.grid, zerolinecolor: c.grid, backgroundcolor: 'rgba(0,0,0,0)', range: undefined });
     // the touches fill the picture; the table may be cut
@@ -442,7 +443,7 @@ globalThis.axiscalPlots = (() => {
     if (flat) {
       const around = map(parts.centre);
       lay.xaxis.range = [around[0] - 1.5 * r, around[0] + 1.5 * r];
-      lay.yaxis.range = [around[1] - r, around[1] + r];
+      lay.yaxis.range = [around[1] - 1.2 * r, around[1] + r];
     }
     el.dataset.magnification = parts.magnification;
     return draw(el, traces, lay, `The machine with its blocks; an arrow at each touch shows its residual (${view.ladder[rung].label}), ${parts.magnification} times enlarged.`)

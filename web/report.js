@@ -4,6 +4,8 @@
   const view = JSON.parse(document.getElementById('view').textContent);
   const P = axiscalPlots;
   const { digits, valued } = P;
+  /** A unit as people write it. */
+  const unitOf = (unit) => unit.replace(/^u(?=m|rad)/, 'µ').replace('deg', '°');
   const id = (name) => document.getElementById(name);
 
   /** An element: tag.class, properties, children (texts or elements). */
@@ -178,6 +180,7 @@
     }
     ev.target.textContent = 'copied';
   } }, 'copy');
+  if (view.study.commands_run_in && view.next.some((n) => n.command)) id('next').before(make('p.muted', {}, view.study.commands_run_in));
   for (const n of view.next) {
     id('next').append(make('li', {}, make('strong', {}, n.what), make('span.how', {}, n.how), n.command ? make('div.command', {}, make('code', {}, n.command), copy(n.command)) : null));
   }
@@ -195,8 +198,8 @@
       const word = untold ? 'not determined' : p.status === 'fixed' ? 'held' : P.JUDGEMENTS[p.judgement].word;
       const kind = { within: 'good', beyond: 'act', open: 'unknown' }[p.judgement] ?? '';
       const cells = [
-        untold ? '?' : `${valued(p.value, p.sigma)}${p.expanded === null ? '' : ` ± ${digits(p.expanded, 2)}`} ${p.unit}`,
-        make(`span.badge${kind ? `.${kind}` : ''}`, {}, word), untold ? '?' : digits(p.at_radius_um), p.tolerance === null ? '–' : `${digits(p.tolerance)} ${p.unit}`, digits(p.sigma, 2),
+        untold ? '?' : `${valued(p.value, p.sigma)}${p.expanded === null ? '' : ` ± ${digits(p.expanded, 2)}`} ${unitOf(p.unit)}`,
+        make(`span.badge${kind ? `.${kind}` : ''}`, {}, word), untold ? '?' : digits(p.at_radius_um), p.tolerance === null ? '–' : `${digits(p.tolerance)} ${unitOf(p.unit)}`, digits(p.sigma, 2),
         ...(proposed ? [old ? valued(old.value, old.sigma) : '–'] : []),
       ];
       return make('tr', {}, cell('th', 0, { scope: 'row' }, p.name + (p.alias ? ` (${p.alias})` : ''), make('span.says', {}, p.says)), ...cells.map((v, k) => cell('td', k + 1, {}, v)));
@@ -228,7 +231,7 @@
           make('dl.facts', {}, ...fact('id', c.effect), ...fact('remaining error', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
             ...fact('cross-validated error', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the difference is known to ± ${digits(c.held_out_se_um, 2)} µm` : ''})` : 'cannot be tried with these poses'),
             ...fact('probability by noise alone', `${p} (${least}, all ${d.tested} effects counted in)`),
-            ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${q.unit}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),
+            ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${unitOf(q.unit)}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),
             ...(alike(c).length ? fact('cannot be separated from', alike(c).join('; ')) : []),
             ...(c.tell_apart ? fact('what separates them', c.tell_apart) : []),
             ...(c.weakens?.length ? fact('makes less certain', c.weakens.map((w) => w.name).join(', ')) : [])),
@@ -351,11 +354,11 @@
       return `${q.dof.startsWith('d') ? `position in ${along}` : `tilt about ${along}`}, ${turns}`;
     };
     const fixed = (v) => v.toFixed(5).replace('-', '−');
-    if (c.terms.length) s.append(table('what the control is given', ['carried', 'axis', 'component', 'active before', 'found', 'given to the control', 'std. unc.', 'unit'], c.terms.map((q) => [q.parameter, q.axis, component(q), fixed(q.active_before), fixed(q.identified), fixed(q.value), digits(q.sigma, 2), q.unit]), [3, 6]));
+    if (c.terms.length) s.append(table('what the control is given', ['carried', 'axis', 'component', 'active before', 'found', 'given to the control', 'std. unc.', 'unit'], c.terms.map((q) => [q.parameter, q.axis, component(q), fixed(q.active_before), fixed(q.identified), fixed(q.value), digits(q.sigma, 2), unitOf(q.unit)]), [3, 6]));
     for (const q of c.shapes) s.append(make('p', {}, `${q.parameter} (${q.effect}): into the table of axis ${q.axis}.`));
     if (c.tool_length_mm !== null) s.append(make('p', {}, `Tool table: the tool is ${digits(c.tool_length_mm)} mm longer than was assumed.`));
     s.append(make('h3', {}, 'What it leaves'));
-    s.append(c.left.length ? table('what the compensation leaves', ['not carried', 'effect', 'value', 'unit', `leaves at ${t.radius_mm} mm, µm`, 'why'], c.left.map((q) => [q.parameter, q.effect, digits(q.value), q.unit, q.left_um === null ? '–' : digits(q.left_um), q.why]), [2, 2])
+    s.append(c.left.length ? table('what the compensation leaves', ['not carried', 'effect', 'value', 'unit', `leaves at ${t.radius_mm} mm, µm`, 'why'], c.left.map((q) => [q.parameter, q.effect, digits(q.value), unitOf(q.unit), q.left_um === null ? '–' : digits(q.left_um), q.why]), [2, 2])
       : make('p', {}, `Nothing of what was found, whatever the control can carry: axiscal export says what its tables leave.${proposed ? '' : ` The remaining error is then about ${digits(view.ladder[e.after].rms_um)} µm, and the noise is ${digits(e.noise_um)} µm.`}`));
   }
 

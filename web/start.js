@@ -26,6 +26,14 @@ function unquoted(word) {
   }
 }
 
+/** Why a file cannot be taken, or nothing. */
+function refusalOf(name, text) {
+  if (text.includes("\0") || /\.(png|jpe?g|gif|webp|pdf|zip|docx?|xlsx?)$/i.test(name)) return "it is no text: plans, logs, CSV and TOML files are read";
+  if (!text.trim()) return "it is empty";
+  if (/\.toml$/i.test(name) && /^\s*\[\[data\]\]/m.test(text)) return `it is a study already: open it with “axiscal workbench ${name}” in its folder, or drop the plans and logs that it names`;
+  return null;
+}
+
 function roleOf(name, text) {
   if (/\.json$/i.test(name)) return "plan";
   if (/\.toml$/i.test(name)) return /^\s*\[\[effect\]\]/m.test(text) ? "effects" : "machines";
@@ -48,11 +56,18 @@ function planOf(text) {
 
 async function add(files) {
   trouble(null);
+  const refused = [];
   for (const file of files) {
     const text = /\.json$/i.test(file.name) ? await file.text() : await file.slice(0, 2_000_000).text();
+    const why = refusalOf(file.name, text);
+    if (why) {
+      refused.push(`${file.name} is not taken: ${why}`);
+      continue;
+    }
     const role = roleOf(file.name, text);
     chosen.push({ file, role, text, ...(role === "plan" ? planOf(text) : {}) });
   }
+  if (refused.length) trouble({ lines: refused });
   show();
 }
 
@@ -97,7 +112,10 @@ function show() {
   if (!named) byId("name").value = centres ? stem(of("centres")[0].file.name) : first ? [first.machine, ...new Set(of("plan").map((p) => p.program))].filter(Boolean).join("-") : "study";
   byId("make").disabled = !(centres || all.length);
   const missing = all.filter((r) => !r.log).map((r) => r.plan.file.name);
-  byId("status").textContent = missing.length ? `No log yet for ${missing.join(", ")}.` : "";
+  const used = new Set(all.map((r) => r.log));
+  const alone = centres ? [] : of("log").filter((l) => !used.has(l)).map((l) => l.file.name);
+  byId("status").textContent = [missing.length ? `No log yet for ${missing.join(", ")}.` : "",
+    alone.length ? `No plan yet for ${alone.join(", ")}: drop the .plan.json that was written beside its program.` : ""].filter(Boolean).join(" ");
 }
 
 // ---------------------------------------------------------------- what is asked of the server

@@ -38,16 +38,19 @@ static ANSWERED: AtomicBool = AtomicBool::new(false);
 /// A finding as JSON: code, severity, what it says and what to do, and its place where it has one.
 pub fn finding_record(finding: &Finding) -> serde_json::Value {
     let place = finding.place();
-    let mut parts = place.as_deref().unwrap_or("").rsplit(':');
+    // a file may have colons in its name
+    let mut parts = place.as_deref().unwrap_or("").rsplitn(3, ':');
     let column = parts.next().and_then(|c| c.parse::<usize>().ok());
     let line = parts.next().and_then(|l| l.parse::<usize>().ok());
+    let file = parts.next();
     let severity = match finding.severity {
         Severity::Error => "error",
         Severity::Warning => "warning",
         Severity::Info => "note",
     };
     serde_json::json!({
-        "code": finding.code, "severity": severity, "says": finding.message, "help": finding.help, "line": line, "column": column,
+        "code": finding.code, "severity": severity, "says": finding.message, "help": finding.help,
+        "file": file, "line": line, "column": column,
     })
 }
 

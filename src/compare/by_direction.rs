@@ -2,6 +2,7 @@
 
 use super::Point;
 use super::model_ladder::direction;
+use super::variables::VariableKind;
 
 /// Positions closer than this share of the range are one position.
 const SAME_POSITION: f64 = 1e-3;
@@ -9,21 +10,55 @@ const SAME_POSITION: f64 = 1e-3;
 const MOST_GROUPS: usize = 24;
 /// Fewer touches in a direction show no pattern.
 const FEWEST_TOUCHES: usize = 8;
+/// Touches to a mean: with fewer, the means follow the noise.
+const TOUCHES_PER_GROUP: usize = 4;
+/// A variable that takes away less than this share of the whole is not drawn for its own sake.
+const WORTH_DRAWING: f64 = 0.1;
+/// By so much of the whole an angle may fall short of a linear axis, and that of time, and still be drawn: in most programs
+/// the positions follow the angles, and time and order follow both, so they take away what belongs to the angles.
+const RANK: f64 = 0.1;
 
-/// Share of the residual's variance in X, Y and Z that the means at each value of `variable` take away, 0 to 1.
+/// How much of the residual goes with a variable.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Explained {
+    /// In X, Y and Z: share of that direction's variance, 0 to 1. `None` where too few touches or only one value say so.
+    pub share: [Option<f64>; 3],
+    /// Share of the variance of all three directions together, 0 to 1.
+    pub whole: f64,
+}
+
+/// Share of the residual's variance that the means at each value of `variable` take away.
 ///
-/// The share is adjusted for the number of groups (adjusted R²), so that noise alone comes out near 0. `None` where too few
-/// touches, or only one value, stand in a direction. The sizes are of the touches used.
+/// The share is adjusted for the number of groups (adjusted R²), so that noise alone comes out near 0. The touches used.
 #[must_use]
-pub fn explained(points: &[Point], variable: &str) -> [Option<f64>; 3] {
+pub fn explained(points: &[Point], variable: &str) -> Explained {
     let mut values: [Vec<(f64, f64)>; 3] = Default::default();
+    let mut squares = [0.0; 3];
     for p in points.iter().filter(|p| p.used) {
+        let (towards, sign) = direction(&p.normal);
+        squares[towards] += p.residual_um * p.residual_um;
         if let Some(x) = p.value(variable) {
-            let (towards, sign) = direction(&p.normal);
             values[towards].push((x, sign * p.residual_um));
         }
     }
-    values.map(adjusted_r2)
+    let share = values.map(adjusted_r2);
+    let all: f64 = squares.iter().sum();
+    let taken: f64 = share.iter().zip(squares).map(|(share, of)| share.unwrap_or(0.0) * of).sum();
+    Explained { share, whole: if all > 0.0 { taken / all } else { 0.0 } }
+}
+
+/// The variable to draw the residual against: number in `all` of the one that takes away most of the whole. The second word
+/// of each says what it is.
+#[must_use]
+pub fn to_draw(all: &[(Explained, VariableKind)]) -> Option<usize> {
+    let worth = |(e, kind): &(Explained, VariableKind)| match kind {
+        VariableKind::Angle => e.whole + 2.0 * RANK,
+        VariableKind::Position => e.whole + RANK,
+        VariableKind::Other => e.whole,
+    };
+    let enough = all.iter().enumerate().filter(|(_, (e, _))| e.whole >= WORTH_DRAWING);
+    // of equals the first
+    enough.rev().max_by(|a, b| worth(a.1).total_cmp(&worth(b.1))).map(|(i, _)| i)
 }
 
 fn adjusted_r2(mut of: Vec<(f64, f64)>) -> Option<f64> {
@@ -50,10 +85,11 @@ fn adjusted_r2(mut of: Vec<(f64, f64)>) -> Option<f64> {
 fn groups(of: &[(f64, f64)]) -> Vec<&[(f64, f64)]> {
     let range = of[of.len() - 1].0 - of[0].0;
     let at_positions: Vec<&[(f64, f64)]> = of.chunk_by(|a, b| b.0 - a.0 <= SAME_POSITION * range).collect();
-    if at_positions.len() <= MOST_GROUPS {
+    let most = MOST_GROUPS.min(of.len() / TOUCHES_PER_GROUP);
+    if at_positions.len() <= most {
         return at_positions;
     }
-    of.chunks(of.len().div_ceil(MOST_GROUPS)).collect()
+    of.chunks(of.len().div_ceil(most)).collect()
 }
 
 #[cfg(test)]
@@ -76,6 +112,16 @@ mod tests {
         assert_eq!(adjusted_r2(vec![(0.0, 1.0); 7]), None);
         assert_eq!(adjusted_r2(vec![(2.0, 1.0); 50]), None);
         assert_eq!(adjusted_r2((0..50).map(|i| (f64::from(i) * 1e-9, 0.0)).collect()), None);
+    }
+
+    #[test]
+    fn an_angle_comes_before_what_follows_it_and_weak_ones_are_not_drawn() {
+        let of = |whole: f64| Explained { share: [Some(whole); 3], whole };
+        use VariableKind::{Angle, Other, Position};
+        assert_eq!(to_draw(&[(of(0.58), Position), (of(0.50), Angle), (of(0.50), Angle), (of(0.69), Other)]), Some(1));
+        assert_eq!(to_draw(&[(of(0.62), Position), (of(0.50), Angle), (of(0.71), Other)]), Some(0));
+        assert_eq!(to_draw(&[(of(0.09), Angle), (of(0.5), Other)]), Some(1));
+        assert_eq!(to_draw(&[(of(0.09), Angle), (of(0.0), Position)]), None);
     }
 
     #[test]

@@ -8,6 +8,7 @@ mod factors;
 pub mod model_ladder;
 pub mod parameter_combinations;
 mod share;
+pub mod variables;
 pub mod verify;
 
 pub use share::Share;

@@ -27,6 +27,21 @@ pub(super) fn beside_the_study(m: &Material, name: &str) -> String {
     m.path.parent().unwrap_or(Path::new("")).join(name).display().to_string()
 }
 
+/// Where the commands run: their paths begin there.
+pub(super) fn run_in(path: &Path) -> String {
+    use std::path::Component;
+    match (path.components().next(), path.components().count()) {
+        (Some(Component::Normal(file)), 1) => format!("Run the commands in the folder of {}.", file.display()),
+        (Some(Component::Normal(folder)), _) => {
+            format!("Run the commands in the folder that contains the folder {}.", folder.display())
+        }
+        (Some(Component::ParentDir | Component::CurDir), _) => {
+            format!("Run the commands in the folder from which the path {} leads to the study.", path.display())
+        }
+        _ => String::new(),
+    }
+}
+
 /// The study.
 pub(super) fn study(m: &Material) -> String {
     quoted(&m.path.display().to_string())
@@ -86,6 +101,15 @@ mod tests {
         ] {
             assert_eq!(quoted(word), expected);
         }
+    }
+
+    #[test]
+    fn commands_run_where_their_paths_begin() {
+        assert_eq!(run_in(Path::new("study.toml")), "Run the commands in the folder of study.toml.");
+        let below = "Run the commands in the folder that contains the folder demo.";
+        assert_eq!(run_in(Path::new("demo/a/study.toml")), below);
+        assert!(run_in(Path::new("../study.toml")).contains("../study.toml leads to the study"));
+        assert_eq!(run_in(Path::new("/data/study.toml")), "");
     }
 
     #[cfg(unix)]

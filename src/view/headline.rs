@@ -49,7 +49,7 @@ pub(super) fn um(x: f64) -> String {
 
 /// The same with its sign.
 fn signed_um(x: f64) -> String {
-    format!("{}{}", if x < 0.0 { "-" } else { "" }, um(x))
+    format!("{}{}", if x < 0.0 { "\u{2212}" } else { "" }, um(x))
 }
 
 /// "3 of 8 errors", "1 of 8 errors", "the one error".
@@ -69,11 +69,20 @@ fn largest(parameters: &[ParameterRecord], judgement: Judgement) -> Option<&Para
 
 /// How large a result is, as a length where it does one at the tolerance's radius.
 pub(super) fn size(p: &ParameterRecord, m: &Material) -> String {
-    let own = || format!("{} {}", crate::report::fit::digits(p.value, p.sigma), p.unit);
+    let own = || with_sign(p.value, p.sigma, &p.unit);
     match (p.at_radius_um, p.unit.as_str()) {
         (Some(size), "mm" | "um") => signed_um(size),
         (Some(size), _) => format!("{}, that is {} at {} mm", own(), um(size), m.tolerance.radius_mm),
         (None, _) => own(),
+    }
+}
+
+/// A value with its unit as people write both.
+fn with_sign(value: f64, sigma: Option<f64>, unit: &str) -> String {
+    let number = crate::report::fit::digits(value, sigma).replace('-', "\u{2212}");
+    match unit {
+        "deg" => format!("{number}°"),
+        _ => format!("{number} {}", crate::report::fit::unit(unit)).trim_end().to_owned(),
     }
 }
 
@@ -112,8 +121,8 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
             d.says.clone(),
         ),
         Verdict::Adequate => {
-            let (level, sentence) = adequate(m, parameters, c);
-            (level, sentence, d.says.clone())
+            let (level, sentence, lost) = adequate(m, parameters, c);
+            (level, sentence, format!("{}{lost}", d.says))
         }
     };
     Headline { level, sentence, detail, why: super::why::why(m, parameters) }
@@ -150,11 +159,15 @@ pub(super) fn in_question(m: &Material, c: &Candidate) -> String {
 /// What the missing effect does to the touches, in figures.
 fn falls(m: &Material, c: &Candidate) -> String {
     let d = m.diagnosis;
-    let moves = if is_one_size(c) { None } else { most_moved_um(m) };
+    let (sizes, moves) = match is_one_size(c) {
+        true => (sizes(m, c), None),
+        false => (Vec::new(), most_moved_um(m)),
+    };
+    let sizes = if sizes.is_empty() { String::new() } else { format!(" Its size: {}.", sizes.join("; ")) };
     let moves = moves.map_or_else(String::new, |most| format!(" It moves single touches by up to {}.", um(most)));
     let rest = if c.remains == Some(true) { " Something else is missing as well." } else { "" };
     format!(
-        "The residual is {}, and {} with this effect in the model; the probe noise is {}.{moves}{rest}",
+        "The residual is {}, and {} with this effect in the model; the probe noise is {}.{sizes}{moves}{rest}",
         um(d.rms_um),
         um(m.proposed.map_or(c.rms_after_um, |fit| fit.outcome.rms_um)),
         um(d.noise_um)
@@ -166,19 +179,26 @@ fn is_one_size(c: &Candidate) -> bool {
     c.parameters.iter().any(|p| p.sigma.is_some()) && c.parameters.len() <= 2 && c.same_as.is_empty()
 }
 
-fn missing(m: &Material, c: &Candidate) -> String {
+/// Its parameters with their sizes.
+fn sizes(m: &Material, c: &Candidate) -> Vec<String> {
     let known = m.proposed.map(|fit| super::parameters::parameters(m, fit)).unwrap_or_default();
-    let sizes: Vec<String> = c
-        .parameters
-        .iter()
-        .filter(|p| p.sigma.is_some())
-        .take(2)
-        .map(|p| match known.iter().find(|r| r.name == p.name && r.sigma.is_some()) {
-            Some(record) => format!("{} {}", p.name, size(record, m)),
-            None => format!("{} {} {}", p.name, crate::report::fit::digits(p.value, p.sigma), p.unit),
-        })
-        .collect();
-    let size = if is_one_size(c) { format!(" ({})", sizes.join(", ")) } else { String::new() };
+    let those = c.parameters.iter().filter(|p| p.sigma.is_some()).take(2);
+    let each = those.map(|p| match known.iter().find(|r| r.name == p.name && r.sigma.is_some()) {
+        Some(record) => format!("{} {}", p.name, size(record, m)),
+        None => format!("{} {}", p.name, with_sign(p.value, p.sigma, &p.unit)),
+    });
+    each.collect()
+}
+
+fn missing(m: &Material, c: &Candidate) -> String {
+    // one number stands beside the name; of several, what they do to a touch
+    let size = match &sizes(m, c)[..] {
+        [one] if is_one_size(c) => format!(" ({one})"),
+        [_, ..] if is_one_size(c) => {
+            most_moved_um(m).map_or_else(String::new, |most| format!(" (moves touches by up to {})", um(most)))
+        }
+        _ => String::new(),
+    };
     let others = match &c.same_as[..] {
         [] => None,
         [one] => Some(named(m, one)),
@@ -212,7 +232,8 @@ fn whose(m: &Material, id: &str) -> (&'static str, &'static str) {
     }
 }
 
-fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (Level, String) {
+/// Level, sentence, and what cannot be determined.
+fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (Level, String, String) {
     let count = |j: Judgement| parameters.iter().filter(|p| p.judgement == j).count();
     let (beyond, open) = (count(Judgement::Beyond), count(Judgement::Open));
     let judged = beyond + open + count(Judgement::Within);
@@ -233,26 +254,26 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
     let start = |text: &str| if with.is_empty() { capital(text) } else { format!("{with}{text}") };
     if let Some(worst) = largest(parameters, Judgement::Beyond) {
         let sentence = format!(
-            "{} {} the tolerance ({limit}), the largest is {} ({}): {}. The model is complete as far as these touches can measure.{untold}",
+            "{} {} the tolerance ({limit}). The largest is {} ({}): {}.",
             start(&count_of_errors(beyond, judged)),
             if beyond == 1 { "exceeds" } else { "exceed" },
             worst.says,
             worst.name,
             size(worst, m)
         );
-        return (Level::Act, sentence);
+        return (Level::Act, sentence, untold);
     }
     if let Some(worst) = largest(parameters, Judgement::Open) {
         let sentence = format!(
-            "{} too uncertain to compare with the tolerance ({limit}): {} ({}) is the worst. No error is certainly larger.{untold}",
+            "{} too uncertain to compare with the tolerance ({limit}): {} ({}) is the worst. No error is certainly larger.",
             start(&format!("{} {}", count_of_errors(open, judged), verb(open))),
             worst.says,
             worst.name
         );
-        return (Level::Unknown, sentence);
+        return (Level::Unknown, sentence, untold);
     }
     if judged == 0 {
-        return (Level::Unknown, format!("The model fits, but none of its errors has a tolerance.{untold}"));
+        return (Level::Unknown, "The model fits, but none of its errors has a tolerance.".to_owned(), untold);
     }
     let level = if lost == 0 { Level::Good } else { Level::Unknown };
     let nothing = "the model is complete as far as these touches can measure";
@@ -262,6 +283,8 @@ fn adequate(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> (
             "{} within the tolerance ({limit}), and {nothing}.{untold}",
             start(&format!("{} {}", all(judged), verb(judged)))
         ),
+        // it is in the sentence
+        String::new(),
     )
 }
 
@@ -281,6 +304,6 @@ mod tests {
 
     #[test]
     fn a_size_keeps_its_sign() {
-        assert_eq!((signed_um(-2.95).as_str(), signed_um(2.95).as_str()), ("-2.95 µm", "2.95 µm"));
+        assert_eq!((signed_um(-2.95).as_str(), signed_um(2.95).as_str()), ("−2.95 µm", "2.95 µm"));
     }
 }

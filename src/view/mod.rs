@@ -123,6 +123,7 @@ pub fn gather(m: &ViewMaterial) -> View {
         study: StudyRecord {
             name: m.study.to_owned(),
             sha256: m.sha256.to_owned(),
+            commands_run_in: command::run_in(m.path),
             date: m.date.to_owned(),
             effects: fit.outcome.effects.clone(),
             runs: m

@@ -140,10 +140,6 @@ fn which(m: &Material, open: &[String], plan_next: &str, out: &mut Vec<Next>) {
 
 fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out: &mut Vec<Next>) {
     let one_of_several = if first.same_as.is_empty() { String::new() } else { format!("If it is {}: ", first.name) };
-    // an effect of a person's own may not say where
-    if !first.look.is_empty() {
-        out.push(Next::new("Check at the machine", format!("{one_of_several}{}", first.look), ""));
-    }
     if !first.same_as.is_empty() {
         let command = if first.never_parted { "" } else { plan_next };
         let act = if first.never_parted { Act::Nothing } else { Act::MeasureMore };
@@ -157,6 +153,10 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
         )
         .with(Act::Add { effect: first.effect.clone() }),
     );
+    // an effect of a person's own may not say where
+    if !first.look.is_empty() {
+        out.push(Next::new("Check at the machine", format!("{one_of_several}{}", first.look), ""));
+    }
     let mends = m.catalogue.get(&first.effect, m.machine).map_or("", |e| e.mends.as_str());
     if !mends.is_empty() {
         out.push(Next::new("How to correct it", format!("{one_of_several}{mends}"), ""));

@@ -74,6 +74,8 @@ pub struct StudyRecord {
     pub name: String,
     /// SHA-256 of the study and all that it names.
     pub sha256: String,
+    /// Where the commands of the report run, in a sentence; empty where they run anywhere.
+    pub commands_run_in: String,
     /// Day of the data.
     pub date: String,
     /// Ids of the effects in the model.

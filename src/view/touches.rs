@@ -3,6 +3,7 @@
 use super::ViewMaterial;
 use super::record::{RungRecord, Touches, UnusableRecord, Variable};
 use crate::compare::model_ladder::{self, Curve, Kind, direction};
+use crate::compare::variables::plot_variables;
 use std::collections::{BTreeMap, HashMap};
 
 /// µm, to a nanometre: a probe sees no less.
@@ -100,35 +101,17 @@ pub(super) fn rungs(m: &ViewMaterial) -> Vec<RungRecord> {
     each.collect()
 }
 
-/// What residuals are drawn against: the rotary axes, the linear ones, then time, order and approach; only what varies.
+/// What residuals are drawn against, with the share of the misfit that goes with it.
 pub(super) fn variables(m: &ViewMaterial) -> Vec<Variable> {
-    let points = &m.comparison.points;
-    let share = |by: &[String]| m.comparison.splits.iter().find(|s| by.contains(&s.by)).map(|s| s.share);
-    let mut out: Vec<Variable> = Vec::new();
-    let rotary_first = m.machine.axes.iter().filter(|a| a.name.is_rotary());
-    for axis in rotary_first.chain(m.machine.axes.iter().filter(|a| !a.name.is_rotary())) {
-        let id = axis.name.to_string();
-        let (kind, unit) = if axis.name.is_rotary() { ("angle of", "deg") } else { ("position of", "mm") };
-        out.push(Variable {
-            title: format!("{kind} axis {id}, {unit}"),
-            share: share(&[format!("pose.{id}"), id.clone()]),
-            id,
-        });
-    }
-    for (id, title, by) in [
-        ("time", "time since the first touch, h", "time"),
-        ("order", "order of the touches, number", "order"),
-        ("approach", "direction of approach about the probe's axis, deg", "direction"),
-        ("stylus", "pivot to ball, mm", "stylus"),
-    ] {
-        out.push(Variable { id: id.to_owned(), title: title.to_owned(), share: share(&[by.to_owned()]) });
-    }
-    out.retain(|v| {
-        let mut values = points.iter().filter_map(|p| p.value(&v.id));
-        let first = values.next();
-        values.any(|x| first.is_some_and(|f| (x - f).abs() > 1e-6))
-    });
-    out
+    let share = |id: &str| {
+        // an axis is split by its poses, and a direction of approach has another name there
+        let by = |s: &&crate::compare::Split| {
+            s.by == id || s.by.strip_prefix("pose.") == Some(id) || (id == "approach" && s.by == "direction")
+        };
+        m.comparison.splits.iter().find(by).map(|s| s.share)
+    };
+    let each = plot_variables(m.machine, &m.comparison.points).into_iter();
+    each.map(|v| Variable { share: share(&v.id), id: v.id, title: v.title }).collect()
 }
 
 /// Curves of each step of the ladder, and of the whole way from "before" to "after".

@@ -105,14 +105,15 @@ fn tolerance(parameters: &[ParameterRecord]) -> String {
     let deciding = [Judgement::Beyond, Judgement::Open, Judgement::Within].into_iter().find_map(worst);
     let Some(p) = deciding else { return "No determined error has a tolerance to compare it with.".to_owned() };
     let digits = |x: f64| crate::report::fit::significant(x);
+    let unit = if p.unit == "deg" { "°".to_owned() } else { crate::report::fit::unit(&p.unit) };
     let says = format!(
         "{} is {} ± {} {} (95 %), and its tolerance is {} {}",
         p.name,
         crate::report::fit::digits(p.value, p.sigma),
         p.expanded.map_or_else(String::new, |e| crate::report::fit::digits(e, p.sigma)),
-        p.unit,
+        unit,
         p.tolerance.map_or_else(String::new, digits),
-        p.unit
+        unit
     );
     match p.judgement {
         Judgement::Beyond => format!("{says}: too large even if the uncertainty is subtracted."),

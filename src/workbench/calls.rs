@@ -58,12 +58,7 @@ pub(super) async fn call(State(shared): State<Arc<Shared>>, body: Bytes) -> Resp
         VerbAsWritten::Export => ("export", Verb::Export(asked.controller, asked.answers.unwrap_or_default())),
     };
     if shared.busy.swap(true, Ordering::SeqCst) {
-        return refusal(
-            StatusCode::TOO_MANY_REQUESTS,
-            "busy",
-            "another task is still running",
-            Some("wait for its end"),
-        );
+        return refusal(StatusCode::OK, "busy", "another task is still running", Some("wait for its end"));
     }
     let began = Job { verb: name, version: now.version, answered: None, failed: Vec::new() };
     *lock(&shared.job) = Some(began.clone());
@@ -149,11 +144,7 @@ pub(super) async fn sketch(State(shared): State<Arc<Shared>>, body: Bytes) -> Re
         }
         match evidence::sketched(&now) {
             Ok((draft, says)) => answer_json(json!({ "draft": draft, "says": says }).to_string().into_bytes()),
-            Err(failure) => {
-                let mut answer = refused(Refused::Unusable(failure));
-                *answer.status_mut() = StatusCode::OK;
-                answer
-            }
+            Err(failure) => refused(Refused::Unusable(failure)),
         }
     })
     .await

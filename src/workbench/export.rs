@@ -135,6 +135,11 @@ impl ExportAnswers {
         for line in &mut answered.messages {
             *line = line.replace(&path, &present.name);
         }
+        for finding in answered.answer["findings"].as_array_mut().into_iter().flatten() {
+            if finding["file"].as_str() == Some(&path) {
+                finding["file"] = present.name.clone().into();
+            }
+        }
     }
 }
 

@@ -2,9 +2,10 @@
 
 use super::desk::Desk;
 use super::draft::MEANING;
-use super::record::{FORMAT, Message, OTHER_VARIABLES, bytes, messages, short};
+use super::record::{FORMAT, Message, bytes, messages, short};
 use super::session::Snapshot;
-use crate::machine::{Machine, Shape};
+use crate::compare::variables::plot_variables;
+use crate::machine::Shape;
 use crate::model::formula::FUNCTIONS;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -159,7 +160,9 @@ pub fn inputs(now: &Snapshot) -> Vec<u8> {
     let opened = &*now.opened;
     let machine = &*opened.machine;
     let applying = opened.catalogue.iter().filter(|e| e.applies_to(machine) && !e.discrete);
-    let touches = touches(now);
+    let points = crate::compare::points(&now.fit);
+    let variables =
+        plot_variables(machine, &points).into_iter().map(|v| Variable { id: v.id, title: v.title }).collect();
     bytes(&Inputs {
         format: FORMAT,
         inputs: now.inputs,
@@ -188,9 +191,9 @@ pub fn inputs(now: &Snapshot) -> Vec<u8> {
         words: words(now),
         controllers: Desk::controllers(),
         effects_file: Desk::effects_file(&opened.study),
-        variables: variables(machine, &touches),
+        variables,
         machine: machine_record(now),
-        touches,
+        touches: touches(now, points),
     })
 }
 
@@ -312,8 +315,7 @@ fn poses(now: &Snapshot) -> Vec<Pose> {
     members.into_iter().map(pose).collect()
 }
 
-fn touches(now: &Snapshot) -> Touches {
-    let points = crate::compare::points(&now.fit);
+fn touches(now: &Snapshot, points: Vec<crate::compare::Point>) -> Touches {
     let mut out = Touches { n: points.len(), ..Touches::default() };
     let mut known: std::collections::HashMap<String, usize> = std::collections::HashMap::new();
     let mut words: Vec<String> = Vec::new();
@@ -345,34 +347,5 @@ fn touches(now: &Snapshot) -> Touches {
         out.normal_r.push(p.normal.map(position));
     }
     out.words = words;
-    out
-}
-
-/// The rotary axes, the linear ones, then time, order and approach; only what varies.
-fn variables(machine: &Machine, touches: &Touches) -> Vec<Variable> {
-    fn varies(mut values: impl Iterator<Item = f64>) -> bool {
-        let first = values.next();
-        values.any(|x| first.is_some_and(|f| (x - f).abs() > 1e-6))
-    }
-    let mut out = Vec::new();
-    let rotary = machine.axes.iter().filter(|a| a.name.is_rotary());
-    for axis in rotary.chain(machine.axes.iter().filter(|a| !a.name.is_rotary())) {
-        let id = axis.name.to_string();
-        let (kind, unit) = if axis.name.is_rotary() { ("angle of", "deg") } else { ("position of", "mm") };
-        if touches.axes.get(&id).is_some_and(|v| varies(v.iter().copied())) {
-            out.push(Variable { title: format!("{kind} axis {id}, {unit}"), id });
-        }
-    }
-    for (id, title) in OTHER_VARIABLES {
-        let there = match id {
-            "time" => varies(touches.time_h.iter().copied()),
-            "order" => touches.n > 1,
-            "approach" => varies(touches.approach_deg.iter().flatten().copied()),
-            _ => varies(touches.stylus_mm.iter().copied()),
-        };
-        if there {
-            out.push(Variable { id: id.into(), title: title.into() });
-        }
-    }
     out
 }

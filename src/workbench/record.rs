@@ -9,6 +9,8 @@ use super::draft::{self, Draft};
 use super::evidence::Scored;
 use super::session::{Refused, Snapshot};
 use super::shelf::Shelf;
+use crate::compare::by_direction::{self, Explained};
+use crate::compare::variables::{VariableKind, plot_variables};
 use crate::diag::{Failure, Finding, Severity};
 use crate::diagnose::Diagnosis;
 use crate::fit;
@@ -123,7 +125,7 @@ struct Live<'a> {
     /// Share of the residual's variance that goes with each variable, in X, Y and Z (adjusted R²).
     explained: Vec<VariableShare>,
     /// The variable on which the residual depends most.
-    axis: Option<&'a str>,
+    axis: Option<String>,
     ladder: &'a History,
     job: Option<&'a Job>,
 }
@@ -141,40 +143,23 @@ pub(super) fn bytes(record: &impl Serialize) -> Vec<u8> {
 /// A row of the table "where the model fails".
 #[derive(Serialize)]
 struct VariableShare {
-    variable: &'static str,
+    variable: String,
     share: [Option<f64>; 3],
 }
 
-/// What residuals may be drawn against: id and title of each; only what varies is offered.
-pub(super) const OTHER_VARIABLES: [(&str, &str); 4] = [
-    ("time", "time since the first touch, h"),
-    ("order", "order of the touches, number"),
-    ("approach", "direction of approach about the probe's axis, deg"),
-    ("stylus", "pivot to ball, mm"),
-];
-
-const AXES: [&str; 6] = ["X", "Y", "Z", "A", "B", "C"];
-
-fn explained(now: &Snapshot) -> Vec<VariableShare> {
+/// The rows, and the variable to draw the residual against.
+fn explained(now: &Snapshot) -> (Vec<VariableShare>, Option<String>) {
     let points = crate::compare::points(&now.fit);
-    let all = AXES.into_iter().chain(OTHER_VARIABLES.iter().map(|v| v.0));
-    let each = all.map(|variable| {
-        let share = crate::compare::by_direction::explained(&points, variable).map(|s| s.map(|s| short(s, 1e4)));
-        VariableShare { variable, share }
+    let variables = plot_variables(&now.opened.machine, &points);
+    let all: Vec<(Explained, VariableKind)> =
+        variables.iter().map(|v| (by_direction::explained(&points, &v.id), v.kind)).collect();
+    let axis = by_direction::to_draw(&all).map(|i| variables[i].id.clone());
+    let rows = variables.into_iter().zip(all);
+    let rows = rows.map(|(v, (e, _))| VariableShare {
+        variable: v.id,
+        share: e.share.map(|share| share.map(|share| short(share, 1e4))),
     });
-    each.filter(|v| v.share.iter().any(Option::is_some)).collect()
-}
-
-/// The variable with the largest share in a direction; of equals the first.
-fn most_explaining(all: &[VariableShare]) -> Option<&'static str> {
-    let largest = |v: &VariableShare| v.share.iter().flatten().copied().fold(0.0, f64::max);
-    let mut best: Option<(&'static str, f64)> = None;
-    for v in all {
-        if best.is_none_or(|(_, share)| largest(v) > share) {
-            best = Some((v.variable, largest(v)));
-        }
-    }
-    best.map(|(variable, _)| variable)
+    (rows.filter(|row| row.share.iter().any(Option::is_some)).collect(), axis)
 }
 
 /// What a step changes.
@@ -184,7 +169,7 @@ pub fn live(now: &Snapshot, job: Option<&Job>) -> Vec<u8> {
     let masks = &now.opened.study.masked;
     let masked: std::collections::HashSet<(usize, u64)> = masks.iter().map(|m| (m.run, m.id)).collect();
     let observations = &fit.data.observations;
-    let explained = explained(now);
+    let (explained, axis) = explained(now);
     bytes(&Live {
         format: FORMAT,
         version: now.version,
@@ -219,7 +204,7 @@ pub fn live(now: &Snapshot, job: Option<&Job>) -> Vec<u8> {
         masked: (0..observations.len())
             .filter(|&i| masked.contains(&(observations[i].run, observations[i].id)))
             .collect(),
-        axis: most_explaining(&explained),
+        axis,
         explained,
         ladder: &now.opened.history,
         job,

@@ -270,22 +270,17 @@ pub(super) fn fault() -> Response<Body> {
     )
 }
 
+/// What a person asked and cannot have is an answer with its reason, and no HTTP error: that would stand in the browser's
+/// console as if the page were faulty.
 pub(super) fn refused(why: Refused) -> Response {
-    let (status, body) = match why {
-        Refused::Stale(version) => (
-            StatusCode::CONFLICT,
-            json!({ "error": "stale", "version": version, "messages": [{ "severity": "warning",
-                "message": "the study has changed meanwhile, in another tab or on the disk",
-                "help": "nothing was done: the page now shows the new state, do it again if it is still wanted" }] }),
-        ),
-        Refused::Unusable(failure) => {
-            (StatusCode::UNPROCESSABLE_ENTITY, json!({ "error": "unusable", "messages": record::messages(&failure.0) }))
-        }
-        Refused::Mistakes(mistakes) => {
-            (StatusCode::UNPROCESSABLE_ENTITY, json!({ "error": "mistakes", "mistakes": mistakes }))
-        }
+    let body = match why {
+        Refused::Stale(version) => json!({ "error": "stale", "version": version, "messages": [{ "severity": "warning",
+            "message": "the study has changed meanwhile, in another tab or on the disk",
+            "help": "nothing was done: the page now shows the new state, do it again if it is still wanted" }] }),
+        Refused::Unusable(failure) => json!({ "error": "unusable", "messages": record::messages(&failure.0) }),
+        Refused::Mistakes(mistakes) => json!({ "error": "mistakes", "mistakes": mistakes }),
     };
-    (status, [(header::CONTENT_TYPE, "application/json")], body.to_string()).into_response()
+    answer_json(body.to_string().into_bytes())
 }
 
 fn denied(d: Denied) -> Response {
@@ -478,13 +473,7 @@ async fn try_out(State(shared): State<Arc<Shared>>, body: Bytes) -> Response {
         }
         match record::tried(&now, &shared.shelf, asked.effect.as_deref(), asked.draft.as_ref()) {
             Ok(bytes) => answer_json(bytes),
-            Err(why @ Refused::Stale(_)) => refused(why),
-            // a formula that is not finished yet is an answer and no fault
-            Err(why) => {
-                let mut answer = refused(why);
-                *answer.status_mut() = StatusCode::OK;
-                answer
-            }
+            Err(why) => refused(why),
         }
     })
     .await

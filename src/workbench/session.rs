@@ -263,15 +263,17 @@ impl Session {
         let text = self.state.opened.text();
         let opened = &self.state.opened;
         let count = |n: usize| if n == 1 { "1 touch".to_owned() } else { format!("{n} touches") };
+        let name =
+            |id: &String| opened.catalogue.get(id, &opened.machine).map_or_else(|| id.clone(), |e| e.name.clone());
         match ask {
             Ask::Switch { effect, on: true } => {
-                Ok((Edit::Add(std::slice::from_ref(effect)).text(opened)?, format!("{effect} on")))
+                Ok((Edit::Add(std::slice::from_ref(effect)).text(opened)?, format!("{} added", name(effect))))
             }
             Ask::Switch { effect, on: false } => {
-                Ok((Edit::Remove(std::slice::from_ref(effect)).text(opened)?, format!("{effect} off")))
+                Ok((Edit::Remove(std::slice::from_ref(effect)).text(opened)?, format!("{} removed", name(effect))))
             }
             Ask::Model { effects } => {
-                let says = format!("back to an earlier model: {}", effects.join(", "));
+                let says = format!("back to an earlier model with {} effects", effects.len());
                 Ok((Edit::Become(effects).text(opened)?, says))
             }
             Ask::Mask { touches, reason } => {
@@ -312,7 +314,7 @@ impl Session {
         }
         let after = Files { study: self.state.opened.with_text(&text)?.bytes, effects: Some(Some(new.into_bytes())) };
         let before = Files { study: opened.bytes.clone(), effects: Some(before) };
-        let says = format!("{} saved in {file}{}", draft.id, if on { ", and on" } else { "" });
+        let says = format!("{} saved in {file}{}", draft.id, if on { " and added" } else { "" });
         let made = Made { says, before, after };
         self.put(&made.before, &made.after)?;
         self.remember(made);

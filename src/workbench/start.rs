@@ -17,8 +17,8 @@ use crate::workflow::Disk;
 use axum::Router;
 use axum::body::Bytes;
 use axum::extract::{DefaultBodyLimit, State};
-use axum::http::{StatusCode, header};
-use axum::response::{IntoResponse, Response};
+use axum::http::StatusCode;
+use axum::response::Response;
 use axum::routing::{get, post};
 use serde::Deserialize;
 use serde_json::json;
@@ -263,7 +263,8 @@ fn check(asked: &NewAsked) -> Result<()> {
             unusable("there is nothing to make a study of", "add a plan and its log, or a file of sphere centres")
         }
         (0, plans, logs) if plans != logs => {
-            Err(Failure::new("new::pairs", format!("{plans} plans and {logs} logs do not pair"))
+            let count = |n: usize, what: &str| format!("{n} {what}{}", if n == 1 { "" } else { "s" });
+            Err(Failure::new("new::pairs", format!("{} and {} do not pair", count(plans, "plan"), count(logs, "log")))
                 .help("add one log for each plan"))
         }
         (0, ..) | (1, 0, 0) => Ok(()),
@@ -302,7 +303,7 @@ async fn aside(
             Ok(alone) => alone,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
             Err(TryLockError::WouldBlock) => {
-                return refusal(StatusCode::TOO_MANY_REQUESTS, "busy", "a study is being opened", Some("wait for it"));
+                return refusal(StatusCode::OK, "busy", "a study is being opened", Some("wait for it"));
             }
         };
         match work(&start) {
@@ -316,7 +317,7 @@ async fn aside(
 
 fn unusable(mut body: serde_json::Value) -> Response {
     body["error"] = json!("unusable");
-    (StatusCode::UNPROCESSABLE_ENTITY, [(header::CONTENT_TYPE, "application/json")], body.to_string()).into_response()
+    answer_json(body.to_string().into_bytes())
 }
 
 #[derive(Deserialize)]

@@ -123,7 +123,7 @@ async function onATelephone(t) {
     holds(found.wide <= 390 && found.right <= 390 && found.own <= 0, `${JSON.stringify({ ...found, rows: 0 })} on 390 px`);
     equal(found.heads, ["error", "value ± 95 %", "verdict"]);
     const squareness = found.rows.find(([name]) => name.startsWith("EC0Y"));
-    holds(/^\d+ ± \d+ urad$/.test(squareness[1]), squareness[1]);
+    holds(/^\d+ ± \d+ µrad$/.test(squareness[1]), squareness[1]);
     equal(squareness[2], "too large");
   }
   await accessible(page, "report on a telephone");

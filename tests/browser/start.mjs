@@ -15,14 +15,14 @@ async function opened(t, name) {
 }
 
 /** Lets files fall on the page. */
-async function drop(page, files) {
+async function drop(page, files, listed = files.length) {
   const given = files.map(([name, text]) => ({ name, text }));
   await page.evaluate((all) => {
     const data = new DataTransfer();
     for (const { name, text } of all) data.items.add(new File([text], name));
     for (const what of ["dragenter", "dragover", "drop"]) document.querySelector("#drop").dispatchEvent(new DragEvent(what, { dataTransfer: data, bubbles: true, cancelable: true }));
   }, given);
-  await page.waitForFunction((n) => document.querySelectorAll("#chosen tbody tr").length === n, files.length);
+  await page.waitForFunction((n) => document.querySelectorAll("#chosen tbody tr").length === n, listed);
 }
 
 const isOpen = (page) => page.waitForSelector("body[data-version]", { timeout: 120_000 });
@@ -80,6 +80,13 @@ async function refused(t) {
   await noHarm(page);
   equal(readdirSync(folder), [], "a refused study left files");
   await page.screenshot({ path: join(t.out, "start-refused.png") });
+  // what is no file of a study is refused by name, and is not in the list
+  for (const [name, content, says] of [["photo.png", "\u0089PNG\r\n\u001a\n", "it is no text"], ["study.toml", text("study.toml"), "it is a study already"], ["nothing.log", "", "it is empty"]]) {
+    await drop(page, [[name, content]], 2);
+    await page.waitForFunction((n) => document.querySelector("#messages").textContent.startsWith(n), name);
+    const why = await page.textContent("#messages");
+    holds(why.startsWith(`${name} is not taken: ${says}`), why);
+  }
   await accessible(page, "start page with an error");
   // put right, and made under the same name
   await page.click('[aria-label="remove head.plan.json"]');
@@ -170,8 +177,8 @@ async function hostileMachine(t) {
   holds((await page.textContent("#machine")).includes(HOSTILE), "the machine's name is not shown");
   await page.fill("#name", "names");
   await page.click("#make");
-  await page.waitForFunction(() => document.body.dataset.version || document.querySelector("#messages")?.textContent.length > 0, null, { timeout: 120_000 });
-  equal((await page.locator("#messages").allTextContents()).join(""), "", "what was refused");
+  await page.waitForFunction(() => document.body.dataset.version || (document.querySelector("#messages-text") ?? document.querySelector("#messages"))?.textContent.length > 0, null, { timeout: 120_000 });
+  equal((await page.locator("#messages-text").allTextContents()).join(""), "", "what was refused");
   await isOpen(page);
   await noHarm(page);
   holds((await page.textContent("body")).includes(HOSTILE), "the machine's name is not shown on the workbench");

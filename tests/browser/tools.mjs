@@ -186,14 +186,11 @@ async function served(study, options, dir, atEnd) {
 export async function watched(context) {
   const page = await context.newPage();
   const seen = { errors: [], asked: [] };
-  page.on("console", (m) => { if (m.type() === "error" && !refusal(m.text())) seen.errors.push(m.text()); });
+  page.on("console", (m) => { if (m.type() === "error") seen.errors.push(m.text()); });
   page.on("pageerror", (e) => seen.errors.push(String(e.stack ?? e)));
   page.on("request", (r) => seen.asked.push(r.url()));
   return [page, seen];
 }
-
-// an answer that says no (a stale state, a call that is refused) is shown in the page, and Chromium notes it as well
-const refusal = (text) => /Failed to load resource: the server responded with a status of (409|422)/.test(text);
 
 /** A screenshot for the eye, and for the guide where that is asked for. */
 export async function picture(page, { out, pictures }, name) {

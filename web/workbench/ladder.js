@@ -14,14 +14,17 @@ export function nameOf(s, i) {
 const same = (a, b) => a.length === b.length && a.every((e) => b.includes(e));
 const HIGH = 44;
 
+/** A model that was there before is no new step: who goes back to it stands on its step. */
+const different = (steps) => steps.filter((s, i) => !steps.slice(0, i).some((earlier) => same(earlier.effects, s.effects)));
+
 function draw() {
   const { live } = state;
-  const steps = live.ladder.steps;
+  const steps = different(live.ladder.steps);
   const sizes = [...steps.map((s) => s.rms_um), live.noise_um].filter((v) => v > 0);
   const [low, high] = [0.8 * Math.min(...sizes), Math.max(...sizes)];
   // equal steps for equal ratios: a small remaining error stays visible beside a large one
   const top = (um) => 14 + HIGH * (1 - Math.log(Math.max(um, low) / low) / Math.log(high / low || 2));
-  const now = steps.findLastIndex((s) => same(s.effects, live.effects));
+  const now = steps.findIndex((s) => same(s.effects, live.effects));
   const each = steps.map((s, i) => {
     const name = nameOf(s, i);
     const line = element("span", { class: "step" });
@@ -29,7 +32,7 @@ function draw() {
     const um = element("span", { class: "um" }, `${significant(s.rms_um)} µm`);
     um.style.top = `${top(s.rms_um) - 15}px`;
     const button = element("button", {
-      type: "button", class: i === now ? "now" : null, title: `${name}: ${significant(s.rms_um)} µm RMS${s.held_out_rms_um ? `, cross-validated ${significant(s.held_out_rms_um)} µm` : ""}`,
+      type: "button", class: i === now ? (s.rms_um <= 1.15 * live.noise_um ? "now good" : "now") : null, title: `${name}: ${significant(s.rms_um)} µm RMS${s.held_out_rms_um ? `, cross-validated ${significant(s.held_out_rms_um)} µm` : ""}`,
       "aria-current": i === now ? "step" : null,
       "data-effects": s.effects.join(" "), click: () => { if (i !== now) step({ model: { effects: s.effects } }); },
     }, line, um, " ", element("span", { class: "name" }, name), element("span", { class: "unseen" }, i === now ? ", the present model" : ", go back to this model"));
@@ -38,7 +41,7 @@ function draw() {
   const noise = element("span", { class: "noise", "aria-hidden": "true" }, "noise");
   noise.style.top = `${top(live.noise_um)}px`;
   const box = byId("ladder");
-  box.replaceChildren(...each, noise);
+  box.replaceChildren(...each, noise, element("span", { class: "space", "aria-hidden": "true" }));
   box.dataset.steps = steps.length;
   box.scrollLeft = box.scrollWidth;
   table(steps);

@@ -35,11 +35,11 @@ on("live", (live, newer, first) => {
   }
   if (newer) {
     document.body.dataset.version = live.version;
-    show("status", first ? "" : live.undo ? `done: ${live.undo}` : "");
+    show("status", first ? "" : live.undo ?? "");
   }
   verdict();
   if (live.fault.length) trouble({ messages: [{ message: "the study on the disk cannot be used: the page shows it as it was" }, ...live.fault] });
-  else if (newer) show("messages", "");
+  else if (newer) trouble(null);
 });
 on("behind", verdict);
 
@@ -53,7 +53,7 @@ function verdict() {
   at.dataset.level = known?.headline?.level ?? (noise === false ? "act" : "");
   at.dataset.verdict = known?.diagnosis?.verdict ?? "";
   const soFar = noise === null ? "There are as many unknowns as touches: the model cannot be judged."
-    : noise ? "The residual is as small as the noise. Searching for a pattern in it …"
+    : noise ? "The residual may be noise. Searching for a pattern in it …"
     : "The residual is larger than the noise. Searching for the missing effect …";
   show("verdict", known?.headline?.sentence ?? soFar);
   at.title = known?.headline?.detail ?? "";
@@ -65,8 +65,10 @@ function verdict() {
 on("trouble", (error) => {
   const words = (error?.messages ?? error?.mistakes ?? (error ? [{ message: String(error.message ?? error) }] : []))
     .map((m) => `${m.place ? `${m.place}: ` : ""}${m.message}${m.help ? `\n  ${m.help}` : ""}`);
-  show("messages", words.join("\n"));
+  show("messages-text", words.join("\n"));
+  byId("messages").hidden = !words.length;
 });
+byId("messages-close").addEventListener("click", () => trouble(null));
 
 byId("undo").addEventListener("click", () => step("undo"));
 byId("redo").addEventListener("click", () => step("redo"));

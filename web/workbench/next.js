@@ -11,7 +11,7 @@ const FIRST = 3;
 
 const BUTTONS = {
   add: (act) => [`Add ${state.inputs.effects.find((e) => e.id === act.effect)?.name ?? act.effect}`, () => switchEffect(act.effect, true)],
-  "measure-more": () => ["Write this program", () => byId("plan-next").click()],
+  "measure-more": () => [`Write the next program (${byId("minutes").value} min)`, () => byId("plan-next").click()],
   export: () => ["Export the compensation", () => byId("open-export").click()],
   sketch: () => ["Sketch it for me", sketch],
 };
@@ -38,6 +38,8 @@ function draw() {
     ...(rest.length ? [element("li", {}, element("details", {}, element("summary", {}, `${rest.length} more`), element("ol", {}, rest)))] : []),
     ...(known ? [] : [element("li", {}, "searching …")]));
   byId("advice").dataset.complete = String(known);
+  // one button for a thing
+  byId("open-export").hidden = all[main]?.act.do === "export";
 }
 on("live", (live, newer) => { if (newer) draw(); });
 on("behind", draw);
@@ -63,7 +65,10 @@ on("job", (job) => {
   if (!job) {
     at.textContent = "";
   } else if (at.dataset.state === "running") {
-    at.textContent = `${job.verb} is at work …`;
+    at.textContent = job.verb === "export" ? "The compensation is being written …" : "The next touches are being chosen …";
+  } else if (job.verb === "export" && job.answered?.code !== 0) {
+    // the reasons stand beside the questions that answer them
+    at.textContent = "Nothing was written: the reason stands under Export.";
   } else if (job.failed.length) {
     at.textContent = job.failed.map((m) => m.message).join("\n");
   } else {
@@ -71,7 +76,7 @@ on("job", (job) => {
     const says = code === 0 ? `${job.verb}: written into ${folder} beside the study` : `${job.verb} could not be done`;
     const more = job.verb === "plan-next" && answer?.touches ? `, ${answer.touches} touches, about ${Math.ceil(answer.time_s / 60)} min` : answer?.says ? `: ${answer.says}` : "";
     const files = answer?.files ? `\n${answer.files.join(", ")}` : "";
-    at.textContent = `${says}${more}${files}${messages.length ? `\n${messages.join("\n")}` : ""}`;
+    at.textContent = job.verb === "export" ? `Written into ${folder}: see Export.` : `${says}${more}${files}${messages.length ? `\n${messages.join("\n")}` : ""}`;
   }
   byId("plan-next").disabled = at.dataset.state === "running";
 });

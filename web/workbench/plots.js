@@ -14,6 +14,8 @@ const MANY = 2500;
 const FALL = 350;
 /** More different values than this are put into bins. */
 const MOST_POSITIONS = 40;
+/** A curve has no more corners: it says where the model goes, the marks say the rest. */
+const MOST_CORNERS = 16;
 
 const box = byId("residuals");
 const plot = element("div", { class: "plot", role: "group" });
@@ -56,9 +58,15 @@ export function variable() {
 
 /** Takes the variable on which the residual of the present model depends most, where the person has chosen none. */
 export function follow() {
-  if (wanted || proposed === state.live.axis) return;
-  proposed = state.live.axis;
-  ghosts = null;
+  const { axis, version } = state.live;
+  if (wanted || !axis || proposed === axis) return;
+  // the marks come to rest first, so that one sees them fall; those of before stay as ghosts
+  const still = restAt - performance.now();
+  if (still > 0) {
+    setTimeout(() => { if (state.live.version === version) follow(); }, still + 20);
+    return;
+  }
+  proposed = axis;
   stale = true;
   drawIfSeen();
   axisListeners.forEach((listener) => listener());
@@ -68,7 +76,6 @@ export function follow() {
 export function lookAt(id, directions = null) {
   wanted = id;
   if (directions) shownDirections = new Set(directions);
-  ghosts = null;
   stale = true;
   drawDirections();
   drawIfSeen();
@@ -245,7 +252,7 @@ export function curvePoints(own, x, um, most) {
 
 function curves(x, um, out) {
   return DIRECTIONS.flatMap((name, d) => (shownDirections.has(d) ? [{
-    type: "scatter", mode: "lines", name: `${name} with it`, hoverinfo: "skip", ...curvePoints(members[d].filter((i) => !out.has(i)), x, um, 60),
+    type: "scatter", mode: "lines", name: `${name} with it`, hoverinfo: "skip", ...curvePoints(members[d].filter((i) => !out.has(i)), x, um, MOST_CORNERS),
     line: { color: colour(name.toLowerCase()), width: 3, dash: ["solid", "dash", "dot"][d] },
   }] : []));
 }

@@ -60,6 +60,25 @@ function moved(p, frame, turn = false) {
   return [0, 1, 2].map((r) => frame[4 * r] * p[0] + frame[4 * r + 1] * p[1] + frame[4 * r + 2] * p[2] + (turn ? 0 : frame[4 * r + 3]));
 }
 
+/** What each thing is called: the artefacts, the parts of the machine, the rotary axes. */
+function names(machine, frameOf) {
+  const above = (p, by) => [p[0], p[1], p[2] + by];
+  const all = [
+    ...machine.blocks.map((b) => ({ at: above(moved(b.centre, frameOf(b.carrier)), 25), says: b.name })),
+    ...machine.solids.map((s) => ({ at: moved(s.at, frameOf(s.carrier)), says: s.name })),
+    ...machine.axes.filter((a) => a.rotary).map((a) => ({ at: along(a, AXIS_LENGTH_MM), says: `axis ${a.name}` })),
+  ];
+  // what stands close to another one would cover its name
+  const near = (p, q) => Math.hypot(...p.map((v, k) => v - q[k])) < NAMES_APART_MM;
+  return all.filter((n, i) => !all.slice(0, i).some((other) => near(n.at, other.at)));
+}
+const NAMES_APART_MM = 25;
+
+/** Half the length of the line that stands for a rotary axis. */
+const AXIS_LENGTH_MM = 60;
+const along = (axis, by) => axis.point.map((v, k) => v + by * axis.direction[k]);
+const axisLines = (machine) => machine.axes.filter((a) => a.rotary).flatMap((a) => [along(a, -AXIS_LENGTH_MM), along(a, AXIS_LENGTH_MM), null]);
+
 const columns = (points) => ({ x: points.map((p) => p && p[0]), y: points.map((p) => p && p[1]), z: points.map((p) => p && p[2]) });
 
 function draw() {
@@ -97,10 +116,13 @@ function draw() {
     tips.push(tip);
   });
   const machine = inputs.machine.solids.flatMap((s) => outline(s).map((p) => p && moved(p, frameOf(s.carrier))));
+  const named = names(inputs.machine, frameOf);
   const line = (points, name, style) => ({ type: "scatter3d", mode: "lines", name, ...columns(points), line: style, hoverinfo: "skip" });
   const traces = [
     line(machine, inputs.machine.name, { color: colour("line"), width: 2 }),
     line(pose ? pose.tool : [], "probe from the pivot to the ball", { color: colour("muted"), width: 6 }),
+    line(axisLines(inputs.machine), "rotary axes", { color: colour("muted"), width: 3, dash: "dash" }),
+    { type: "scatter3d", mode: "text", name: "names", ...columns(named.map((n) => n.at)), text: named.map((n) => n.says), textfont: { size: 12, color: colour("ink") }, hoverinfo: "skip" },
     line(arrows, "residual", { color: colour("x"), width: 3 }),
     { type: "scatter3d", mode: "markers", name: "touches", ...columns(tips), customdata: kept, marker: { size: 2, color: colour("y") },
       text: kept.map((i) => `touch ${t.id[i]} of run ${t.run[i]}: ${significant(live.residual_um[i])} µm`), hoverinfo: "text" },
@@ -108,7 +130,7 @@ function draw() {
   ];
   // touches and arrows stay large enough to be seen: of a large machine only the middle is shown
   const reach = machine.reduce((far, p) => (p ? Math.max(far, ...p.map((v, k) => Math.abs(v - at[0][k]))) : far), 0);
-  const half = Math.max(0.75 * Math.max(...spread, 1), Math.min(reach, 1.6 * Math.max(...spread, 1)));
+  const half = Math.max(0.75 * Math.max(...spread, 1), Math.min(reach, 2.5 * Math.max(...spread, 1)));
   const middle = [0, 1, 2].map((k) => {
     let low = Infinity, high = -Infinity;
     for (const p of at) { low = Math.min(low, p[k]); high = Math.max(high, p[k]); }
@@ -122,7 +144,7 @@ function draw() {
   delete layout.xaxis;
   delete layout.yaxis;
   Plotly.react(box, traces, layout, { responsive: true, displaylogo: false, displayModeBar: false });
-  show("space-scale", `Arrows are ${times.toLocaleString("en")} times as long as the residual: ${significant(top)} µm are drawn as ${significant(top * 1e-3 * times)} mm. Touches as the plan has them.`);
+  show("space-scale", `Each dot is a touch, at the end of its residual. Residuals are ${times.toLocaleString("en")} times as long as they are: ${significant(top)} µm are drawn as ${significant(top * 1e-3 * times)} mm. Touches as the plan has them.`);
 }
 
 slider.addEventListener("input", () => { stale = true; draw(); });
@@ -131,7 +153,7 @@ onHover((i) => {
   if (!seen || !possible || stale || box.data === undefined) return;
   const t = state.inputs.touches;
   const p = i === null ? [null, null, null] : t.point[i];
-  Plotly.restyle(box, { x: [[p[0]]], y: [[p[1]]], z: [[p[2]]] }, [4]);
+  Plotly.restyle(box, { x: [[p[0]]], y: [[p[1]]], z: [[p[2]]] }, [6]);
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   stale = true;

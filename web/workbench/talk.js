@@ -60,7 +60,7 @@ export async function step(what, first = null) {
     await new Promise((done) => soonest("painted", () => { times.painted = performance.now() - began; done(); }));
     return true;
   } catch (error) {
-    if (error.status === 409) await refresh().catch(trouble);
+    if (error.error === "stale") await refresh().catch(trouble);
     trouble(error);
     return false;
   } finally {

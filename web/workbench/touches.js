@@ -18,7 +18,7 @@ const COLUMNS = [
   ["block", (t, i) => t.words[t.block[i]], (t, i) => t.words[t.block[i]]],
   ["face", (t, i) => t.words[t.face[i]], (t, i) => t.words[t.face[i]]],
   ["stage", (t, i) => t.words[t.stage[i]], (t, i) => t.words[t.stage[i]]],
-  ["rotary axes, deg", (t, i) => ["A", "B", "C"].filter((a) => t.axes[a]).map((a) => `${a} ${significant(t.axes[a][i])}`).join(" "), (t, i) => i],
+  ["rotary axes, °", (t, i) => ["A", "B", "C"].filter((a) => t.axes[a]).map((a) => `${a} ${significant(t.axes[a][i])}`).join(" "), (t, i) => i],
   ["line in the log", (t, i) => t.line[i], (t, i) => t.line[i]],
 ];
 

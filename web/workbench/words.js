@@ -5,16 +5,18 @@ export function stated(value, sigma) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   if (sigma > 0) {
     const digits = Math.min(9, Math.max(0, 1 - Math.floor(Math.log10(sigma))));
-    return value.toFixed(digits);
+    return minus(value.toFixed(digits));
   }
   return significant(value);
 }
+
+const minus = (text) => text.replace("-", "−");
 
 export function significant(value, digits = 3) {
   if (value === null || value === undefined || !Number.isFinite(value)) return "–";
   if (value === 0) return "0";
   const size = Math.floor(Math.log10(Math.abs(value)));
-  return size < -5 || size > 6 ? value.toExponential(digits - 1) : value.toFixed(Math.max(0, digits - 1 - size));
+  return minus(size < -5 || size > 6 ? value.toExponential(digits - 1) : value.toFixed(Math.max(0, digits - 1 - size)));
 }
 
 /** A unit as people write it. */

@@ -520,9 +520,9 @@ pub fn not_run(machine: &Machine, tables: &Tables, position_tables: bool) -> Vec
         }
     };
     add("the tables".to_owned(), &tables.source, &tables.unverified);
-    add(format!("kind {}", kind.name), &kind.source, &kind.unverified);
-    kind.vector.iter().for_each(|v| add(v.id.clone(), &v.source, &v.unverified));
-    kind.angle.iter().for_each(|a| add(a.id.clone(), &a.source, &a.unverified));
+    add(format!("entries for the kind \"{}\"", kind.name), &kind.source, &kind.unverified);
+    kind.vector.iter().for_each(|v| add(v.says.clone(), &v.source, &v.unverified));
+    kind.angle.iter().for_each(|a| add(a.says.clone(), &a.source, &a.unverified));
     if let Some(grid) = tables.grid.as_ref().filter(|_| position_tables) {
         add("position tables".to_owned(), &grid.source, &grid.unverified);
     }
@@ -532,6 +532,13 @@ pub fn not_run(machine: &Machine, tables: &Tables, position_tables: bool) -> Vec
         .filter(|f| position_tables || !f.grids)
         .for_each(|f| add(format!("file {}", f.name), &f.source, &f.unverified));
     out
+}
+
+/// What an entry is, in words: its id is a key of the postprocessor's file.
+fn entry_says(kind: &Kind, id: &str) -> String {
+    let vectors = kind.vector.iter().map(|v| (&v.id, &v.says));
+    let mut all = vectors.chain(kind.angle.iter().map(|a| (&a.id, &a.says)));
+    all.find(|(known, _)| *known == id).map_or_else(|| id.to_owned(), |(_, says)| says.clone())
 }
 
 /// Entries that are not verified, and why: refused, or reported.
@@ -550,12 +557,12 @@ fn say_unverified(
         }
     };
     add("the tables".to_owned(), doubt(tables.source.as_ref(), tables.unverified.as_ref()));
-    add(format!("kind {}", kind.name), doubt(kind.source.as_ref(), kind.unverified.as_ref()));
+    add(format!("entries for the kind \"{}\"", kind.name), doubt(kind.source.as_ref(), kind.unverified.as_ref()));
     let mut seen = BTreeSet::new();
     for value in &filled.values {
         let id = value.id.split('.').next().unwrap_or_default().to_owned();
         if seen.insert(id.clone()) {
-            add(id, value.unverified.clone());
+            add(entry_says(kind, &id), value.unverified.clone());
         }
     }
     if grids && let Some(form) = &tables.grid {
