@@ -18,6 +18,9 @@ globalThis.axiscalPlots = (() => {
   // Plotly reads a few HTML tags in its texts: names come from files of the user's own
   const safe = (text) => String(text).replaceAll('&', '&amp;').replaceAll('<', '&lt;').replaceAll('>', '&gt;');
 
+  /** The title of an axis; a degree has its sign on a page. */
+  const titleOf = (variable) => safe(variable.title).replace(/, deg$/, ', °');
+
   /** Three significant digits, plainly written. */
   function digits(x, n = 3) {
     if (x === null || x === undefined || !Number.isFinite(x)) return '–';
@@ -244,7 +247,7 @@ globalThis.axiscalPlots = (() => {
     const small = narrow(el, 260);
     const lay = layout(el, {
       ...(small ? { margin: { l: 4, r: 6, t: 4, b: alongNormal ? 46 : 34 } } : {}),
-      xaxis: { title: { text: small ? safe(variable.title).replace(' about ', '<br>about ') : safe(variable.title), ...(narrow(el, 360) ? { font: { size: 10 } } : {}) }, zeroline: false, ...(small ? { nticks: 5, tickangle: 0, tickfont: { size: 9 } } : {}) },
+      xaxis: { title: { text: small ? titleOf(variable).replace(' about ', '<br>about ') : titleOf(variable), ...(narrow(el, 360) ? { font: { size: 10 } } : {}) }, zeroline: false, ...(small ? { nticks: 5, tickangle: 0, tickfont: { size: 9 } } : {}) },
       yaxis: { title: { text: alongNormal && !small ? 'residual along the normal, µm' : 'residual, µm', ...(small ? { font: { size: 10 } } : {}) }, zeroline: true, ...(small ? { nticks: 5, tickfont: { size: 9 } } : {}) },
       shapes: [{ type: 'rect', x0: 0, x1: 1, xref: 'paper', y0: -noise, y1: noise, fillcolor: c.band, line: { width: 0 }, layer: 'below' }],
       hovermode: 'closest',

@@ -372,7 +372,7 @@
     for (const u of view.unusable) rows.push({ i: -1, run: u.run, id: u.id, stage: '', block: '', face: '', time: null, before: null, after: null, std: null, why: u.reason, source: `${view.study.runs[u.run - 1]?.log ?? 'log'}:${u.line}` });
     // of the study's own model, whose residual is in the column before
     const unusual = ['std', 'how unusual', 1, `The residual ${proposed ? 'before' : 'after'}, divided by the standard deviation that the other touches predict (studentised): noise alone seldom exceeds 4`];
-    const columns = [['run', 'run', 1], ['id', 'touch', 1], ['stage', 'stage'], ['block', 'block'], ['face', 'face'], ...letters.map((l) => [l, `${l}, ${'ABC'.includes(l) ? 'deg' : 'mm'}`, 1]), ['time', 'time, h', 1], ['before', 'before, µm', 1], ...(proposed ? [unusual] : []), ['after', 'after, µm', 1], ...(proposed ? [] : [unusual]), ['why', 'not used because'], ['source', 'source line']];
+    const columns = [['run', 'run', 1], ['id', 'touch', 1], ['stage', 'stage'], ['block', 'block'], ['face', 'face'], ...letters.map((l) => [l, `${l}, ${'ABC'.includes(l) ? '°' : 'mm'}`, 1]), ['time', 'time, h', 1], ['before', 'before, µm', 1], ...(proposed ? [unusual] : []), ['after', 'after, µm', 1], ...(proposed ? [] : [unusual]), ['why', 'not used because'], ['source', 'source line']];
     let size = 50;
     const sort = { by: 'after', down: true };
     let filter = '';

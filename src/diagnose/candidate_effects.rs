@@ -87,8 +87,10 @@ impl Source {
         let variant = Variant { effects: vec![chosen.effect], shapes };
         let made = columns_at(&self.model, &self.traces, &variant, touches);
         let shaped: Vec<usize> = (0..made.unknowns.len()).filter(|&c| made.unknowns[c].shape).collect();
-        let mut values = made.values.remove_columns_at(&shaped);
-        for (mut values, u) in values.column_iter_mut().zip(made.unknowns.iter().filter(|u| !u.shape)) {
+        let kinds: Vec<&Unknown> = made.unknowns.iter().filter(|u| !u.shape).collect();
+        // a copy of many columns only where some of them go
+        let mut values = if shaped.is_empty() { made.values } else { made.values.remove_columns_at(&shaped) };
+        for (mut values, u) in values.column_iter_mut().zip(kinds) {
             values *= typical(u);
         }
         values
@@ -96,6 +98,10 @@ impl Source {
 
     /// Columns of some choices, each with the place of a column in it, at some touches (`None`: at all); mm per typical size.
     fn some(&self, wanted: &[(Chosen, usize)], touches: Option<&[usize]>) -> DMatrix<f64> {
+        let is_one = wanted.iter().enumerate().all(|(k, (chosen, at))| *at == k && chosen.is(wanted[0].0));
+        if is_one && wanted.first().is_some_and(|(chosen, _)| self.sizes(chosen.effect).count() == wanted.len()) {
+            return self.columns(wanted[0].0, touches);
+        }
         let n = touches.map_or(self.traces.n_touches(), <[usize]>::len);
         let mut out = DMatrix::zeros(n, wanted.len());
         let mut at = 0;

@@ -111,7 +111,7 @@ pub(super) fn variables(m: &ViewMaterial) -> Vec<Variable> {
         m.comparison.splits.iter().find(by).map(|s| s.share)
     };
     let each = plot_variables(m.machine, &m.comparison.points).into_iter();
-    each.map(|v| Variable { share: share(&v.id), id: v.id, title: v.title }).collect()
+    each.map(|v| Variable { share: share(&v.id), title: v.title(), id: v.id }).collect()
 }
 
 /// Curves of each step of the ladder, and of the whole way from "before" to "after".

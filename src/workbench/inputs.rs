@@ -162,7 +162,7 @@ pub fn inputs(now: &Snapshot) -> Vec<u8> {
     let applying = opened.catalogue.iter().filter(|e| e.applies_to(machine) && !e.discrete);
     let points = crate::compare::points(&now.fit);
     let variables =
-        plot_variables(machine, &points).into_iter().map(|v| Variable { id: v.id, title: v.title }).collect();
+        plot_variables(machine, &points).into_iter().map(|v| Variable { title: v.title_on_page(), id: v.id }).collect();
     bytes(&Inputs {
         format: FORMAT,
         inputs: now.inputs,

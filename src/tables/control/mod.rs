@@ -520,7 +520,7 @@ pub fn not_run(machine: &Machine, tables: &Tables, position_tables: bool) -> Vec
         }
     };
     add("the tables".to_owned(), &tables.source, &tables.unverified);
-    add(format!("entries for the kind \"{}\"", kind.name), &kind.source, &kind.unverified);
+    add(kind_says(kind), &kind.source, &kind.unverified);
     kind.vector.iter().for_each(|v| add(v.says.clone(), &v.source, &v.unverified));
     kind.angle.iter().for_each(|a| add(a.says.clone(), &a.source, &a.unverified));
     if let Some(grid) = tables.grid.as_ref().filter(|_| position_tables) {
@@ -534,8 +534,20 @@ pub fn not_run(machine: &Machine, tables: &Tables, position_tables: bool) -> Vec
     out
 }
 
+/// The key of the machine's kind in the list of what is not verified.
+fn kind_id(kind: &Kind) -> String {
+    format!("kind {}", kind.name)
+}
+
+fn kind_says(kind: &Kind) -> String {
+    format!("entries for the kind \"{}\"", kind.name)
+}
+
 /// What an entry is, in words: its id is a key of the postprocessor's file.
 fn entry_says(kind: &Kind, id: &str) -> String {
+    if id == kind_id(kind) {
+        return kind_says(kind);
+    }
     let vectors = kind.vector.iter().map(|v| (&v.id, &v.says));
     let mut all = vectors.chain(kind.angle.iter().map(|a| (&a.id, &a.says)));
     all.find(|(known, _)| *known == id).map_or_else(|| id.to_owned(), |(_, says)| says.clone())
@@ -557,12 +569,12 @@ fn say_unverified(
         }
     };
     add("the tables".to_owned(), doubt(tables.source.as_ref(), tables.unverified.as_ref()));
-    add(format!("entries for the kind \"{}\"", kind.name), doubt(kind.source.as_ref(), kind.unverified.as_ref()));
+    add(kind_id(kind), doubt(kind.source.as_ref(), kind.unverified.as_ref()));
     let mut seen = BTreeSet::new();
     for value in &filled.values {
         let id = value.id.split('.').next().unwrap_or_default().to_owned();
         if seen.insert(id.clone()) {
-            add(entry_says(kind, &id), value.unverified.clone());
+            add(id, value.unverified.clone());
         }
     }
     if grids && let Some(form) = &tables.grid {
@@ -572,7 +584,7 @@ fn say_unverified(
         add(format!("file {}", file.name), doubt(file.source.as_ref(), file.unverified.as_ref()));
     }
     for (what, why) in &doubts {
-        let message = format!("{what}: not verified: {why}");
+        let message = format!("{}: not verified: {why}", entry_says(kind, what));
         findings.push(if options.accept_unverified {
             Finding::warning("tables::unverified", message)
                 .help("compare it with the control's manual and its own backup before you load it")
