@@ -61,7 +61,7 @@ function moved(p, frame, turn = false) {
 }
 
 /** What each thing is called: the artefacts, the parts of the machine, the rotary axes. */
-function names(machine, frameOf) {
+function names(machine, frameOf, apart) {
   const above = (p, by) => [p[0], p[1], p[2] + by];
   const all = [
     ...machine.blocks.map((b) => ({ at: above(moved(b.centre, frameOf(b.carrier)), 25), says: b.name })),
@@ -69,10 +69,9 @@ function names(machine, frameOf) {
     ...machine.axes.filter((a) => a.rotary).map((a) => ({ at: along(a, AXIS_LENGTH_MM), says: `axis ${a.name}` })),
   ];
   // what stands close to another one would cover its name
-  const near = (p, q) => Math.hypot(...p.map((v, k) => v - q[k])) < NAMES_APART_MM;
+  const near = (p, q) => Math.hypot(...p.map((v, k) => v - q[k])) < apart;
   return all.filter((n, i) => !all.slice(0, i).some((other) => near(n.at, other.at)));
 }
-const NAMES_APART_MM = 25;
 
 /** Half the length of the line that stands for a rotary axis. */
 const AXIS_LENGTH_MM = 60;
@@ -116,13 +115,11 @@ function draw() {
     tips.push(tip);
   });
   const machine = inputs.machine.solids.flatMap((s) => outline(s).map((p) => p && moved(p, frameOf(s.carrier))));
-  const named = names(inputs.machine, frameOf);
   const line = (points, name, style) => ({ type: "scatter3d", mode: "lines", name, ...columns(points), line: style, hoverinfo: "skip" });
   const traces = [
     line(machine, inputs.machine.name, { color: colour("line"), width: 2 }),
     line(pose ? pose.tool : [], "probe from the pivot to the ball", { color: colour("muted"), width: 6 }),
     line(axisLines(inputs.machine), "rotary axes", { color: colour("muted"), width: 3, dash: "dash" }),
-    { type: "scatter3d", mode: "text", name: "names", ...columns(named.map((n) => n.at)), text: named.map((n) => n.says), textfont: { size: 12, color: colour("ink") }, hoverinfo: "skip" },
     line(arrows, "residual", { color: colour("x"), width: 3 }),
     { type: "scatter3d", mode: "markers", name: "touches", ...columns(tips), customdata: kept, marker: { size: 2, color: colour("y") },
       text: kept.map((i) => `touch ${t.id[i]} of run ${t.run[i]}: ${significant(live.residual_um[i])} µm`), hoverinfo: "text" },
@@ -131,6 +128,8 @@ function draw() {
   // touches and arrows stay large enough to be seen: of a large machine only the middle is shown
   const reach = machine.reduce((far, p) => (p ? Math.max(far, ...p.map((v, k) => Math.abs(v - at[0][k]))) : far), 0);
   const half = Math.max(0.75 * Math.max(...spread, 1), Math.min(reach, 2.5 * Math.max(...spread, 1)));
+  const named = names(inputs.machine, frameOf, 0.25 * half);
+  traces.push({ type: "scatter3d", mode: "text", name: "names", ...columns(named.map((n) => n.at)), text: named.map((n) => n.says), textfont: { size: 12, color: colour("ink") }, hoverinfo: "skip" });
   const middle = [0, 1, 2].map((k) => {
     let low = Infinity, high = -Infinity;
     for (const p of at) { low = Math.min(low, p[k]); high = Math.max(high, p[k]); }
@@ -153,7 +152,7 @@ onHover((i) => {
   if (!seen || !possible || stale || box.data === undefined) return;
   const t = state.inputs.touches;
   const p = i === null ? [null, null, null] : t.point[i];
-  Plotly.restyle(box, { x: [[p[0]]], y: [[p[1]]], z: [[p[2]]] }, [6]);
+  Plotly.restyle(box, { x: [[p[0]]], y: [[p[1]]], z: [[p[2]]] }, [5]);
 });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
   stale = true;
