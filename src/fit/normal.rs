@@ -114,7 +114,7 @@ impl<'a> Touches<'a> {
     }
 
     /// Something of each part of the touches, in their order. One part is no work for threads: starting them takes as long.
-    fn each_chunk<T: Send>(&self, of: impl Fn(&Range<usize>) -> T + Sync) -> Vec<T> {
+    pub(super) fn each_chunk<T: Send>(&self, of: impl Fn(&Range<usize>) -> T + Sync) -> Vec<T> {
         match self.chunks.as_slice() {
             [only] => vec![of(only)],
             many => many.par_iter().map(&of).collect(),
@@ -223,14 +223,26 @@ impl<'a> Touches<'a> {
             .map(|s| layout.row(s).enumerate().filter_map(|(place, u)| Some((place, column_of[u]?))).unzip())
             .collect();
         let mut out = ShortRows { columns: kept.iter().map(|k| k.1.clone()).collect(), ..ShortRows::default() };
-        let mut scratch = self.batch.scratch();
-        let mut row = Vec::new();
-        for (i, o) in self.batch.observations().iter().enumerate() {
-            row.resize(layout.row_length(o.set_up), 0.0);
-            out.gap.push(at.gap_and_row(i, &mut scratch, &mut row));
+        let of_part = |part: &Range<usize>| {
+            let (mut scratch, mut row) = (self.batch.scratch(), Vec::new());
+            let (mut gaps, mut values) = (Vec::with_capacity(part.len()), Vec::new());
+            for i in part.clone() {
+                let set_up = self.batch.observations()[i].set_up;
+                row.resize(layout.row_length(set_up), 0.0);
+                gaps.push(at.gap_and_row(i, &mut scratch, &mut row));
+                values.extend(kept[set_up].0.iter().map(|&place| row[place]));
+            }
+            (gaps, values)
+        };
+        for (gaps, values) in self.each_chunk(of_part) {
+            out.gap.extend(gaps);
+            out.values.extend(values);
+        }
+        let mut start = 0;
+        for o in self.batch.observations() {
             out.set_up.push(o.set_up);
-            out.start.push(out.values.len());
-            out.values.extend(kept[o.set_up].0.iter().map(|&place| row[place]));
+            out.start.push(start);
+            start += kept[o.set_up].0.len();
         }
         out
     }

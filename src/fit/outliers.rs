@@ -7,6 +7,7 @@ use super::normal::Touches;
 use super::quantiles::student_as_4;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 /// A touch further off than 4 standard deviations is left out: the chance of a good one is 6e-5. Where few others say what a standard
 /// deviation is, it takes more for the same chance; `dof` are the degrees of freedom of that.
@@ -84,14 +85,19 @@ impl Rows<'_, '_> {
 
     /// Diagonal of V⁻¹ − V⁻¹JCJᵀV⁻¹, visit by visit; 0 for touches that are not used.
     fn diagonal(&self, covariance: &DMatrix<f64>) -> Vec<f64> {
-        let (sigma, tau) = self.touches.noise_mm();
-        let (w, s2) = (self.touches.weights(), sigma * sigma);
         let own: Vec<DMatrix<f64>> =
             self.columns.iter().map(|c| DMatrix::from_fn(c.len(), c.len(), |a, b| covariance[(c[a], c[b])])).collect();
-        let n = self.gap.len();
-        let mut d = vec![0.0; n];
+        let of_part = |part: &Range<usize>| self.diagonal_of(part.clone(), covariance, &own);
+        self.touches.each_chunk(of_part).concat()
+    }
+
+    /// The diagonal at touches of whole visits; `own` is the covariance of each set-up's unknowns.
+    fn diagonal_of(&self, part: Range<usize>, covariance: &DMatrix<f64>, own: &[DMatrix<f64>]) -> Vec<f64> {
+        let (sigma, tau) = self.touches.noise_mm();
+        let (w, s2) = (self.touches.weights(), sigma * sigma);
+        let mut d = vec![0.0; part.len()];
         let mut moved: Vec<f64> = Vec::new();
-        let visits = if tau > 0.0 { self.touches.visits_in(0..n) } else { std::iter::once(0..n).collect() };
+        let visits = if tau > 0.0 { self.touches.visits_in(part.clone()) } else { vec![part.clone()] };
         for visit in visits {
             let (mut m, mut shared, mut square) = (Matrix3::zeros(), DMatrix::zeros(0, 0), Matrix3::zeros());
             if tau > 0.0 {
@@ -130,7 +136,7 @@ impl Rows<'_, '_> {
                     let cross = Vector3::from_fn(|k, _| self.dot(i, shared.column(k).as_slice()));
                     fit += (mn.dot(&(square * mn)) - 2.0 * cross.dot(&mn)) / (s2 * s2);
                 }
-                d[i] = noise - fit;
+                d[i - part.start] = noise - fit;
             }
         }
         d

@@ -43,7 +43,10 @@ function draw() {
   const box = byId("ladder");
   box.replaceChildren(...each, noise, element("span", { class: "space", "aria-hidden": "true" }));
   box.dataset.steps = steps.length;
-  box.scrollLeft = box.scrollWidth;
+  // the line of the noise goes below all steps, also below those that are out of sight
+  noise.style.width = `${box.scrollWidth}px`;
+  const present = each[now];
+  if (present) box.scrollLeft = present.offsetLeft + present.offsetWidth - box.clientWidth + (now === each.length - 1 ? 40 : 0);
   table(steps);
 }
 
