@@ -168,7 +168,7 @@ globalThis.axiscalPlots = (() => {
     const names = view.ladder.map((r) => safe(r.label).replace(/ (?=\S{12})/g, '<br>'));
     const noise = view.errors.noise_um;
     const traces = [
-      { type: 'scatter', mode: 'lines+markers+text', x, y: view.ladder.map((r) => r.rms_um), line: { color: OKABE.blue, width: 3, shape: 'hv' }, marker: { size: 10, color: OKABE.blue, symbol: view.ladder.map((r) => (r.kind === 'proposed' ? 'circle-open' : 'circle')) }, text: view.ladder.map((r) => `${digits(r.rms_um)}`), textposition: 'top right', name: 'fitted', hovertemplate: '%{y:.3f} µm<extra>fitted</extra>', cliponaxis: false },
+      { type: 'scatter', mode: 'lines+markers+text', x, y: view.ladder.map((r) => r.rms_um), line: { color: OKABE.blue, width: 3, shape: 'hv' }, marker: { size: 10, color: OKABE.blue, symbol: view.ladder.map((r) => (r.kind === 'proposed' ? 'circle-open' : 'circle')) }, text: view.ladder.map((r) => `${digits(r.rms_um)}`), textposition: view.ladder.map((r) => (r.rms_um < noise ? 'middle right' : 'top right')), name: 'fitted', hovertemplate: '%{y:.3f} µm<extra>fitted</extra>', cliponaxis: false },
       { type: 'scatter', mode: 'markers', x, y: view.ladder.map((r) => r.held_out_rms_um), marker: { size: 12, symbol: 'diamond-open', color: OKABE.red, line: { width: 2 } }, name: 'cross-validated', hovertemplate: '%{y:.3f} µm<extra>cross-validated</extra>' },
     ];
     const all = view.ladder.flatMap((r) => [r.rms_um, r.held_out_rms_um]).filter((v) => v > 0).concat(noise);
