@@ -14,8 +14,9 @@ export function nameOf(s, i) {
 const same = (a, b) => a.length === b.length && a.every((e) => b.includes(e));
 const HIGH = 44;
 
-/** A model that was there before is no new step: who goes back to it stands on its step. */
-const different = (steps) => steps.filter((s, i) => !steps.slice(0, i).some((earlier) => same(earlier.effects, s.effects)));
+/** A model that was there before is no new step: who goes back to it stands on its step, with its newest figures. */
+const different = (steps) => steps.filter((s, i) => !steps.slice(0, i).some((earlier) => same(earlier.effects, s.effects)))
+  .map((s) => ({ ...steps.findLast((later) => same(later.effects, s.effects)), added: s.added, removed: s.removed }));
 
 function draw() {
   const { live } = state;

@@ -61,12 +61,13 @@ function moved(p, frame, turn = false) {
 }
 
 /** What each thing is called: the artefacts, the parts of the machine, the rotary axes. */
-function names(machine, frameOf, apart) {
+function names(machine, frameOf, apart, atZero) {
   const above = (p, by) => [p[0], p[1], p[2] + by];
   const all = [
     ...machine.blocks.map((b) => ({ at: above(moved(b.centre, frameOf(b.carrier)), 25), says: b.name })),
     ...machine.solids.map((s) => ({ at: moved(s.at, frameOf(s.carrier)), says: s.name })),
-    ...machine.axes.filter((a) => a.rotary).map((a) => ({ at: along(a, AXIS_LENGTH_MM), says: `axis ${a.name}` })),
+    // one axis carries another: only with all axes at zero do they stand as the machine's description has them
+    ...machine.axes.filter((a) => a.rotary && atZero).map((a) => ({ at: along(a, AXIS_LENGTH_MM), says: `axis ${a.name}` })),
   ];
   // what stands close to another one would cover its name
   const near = (p, q) => Math.hypot(...p.map((v, k) => v - q[k])) < apart;
@@ -119,7 +120,7 @@ function draw() {
   const traces = [
     line(machine, inputs.machine.name, { color: colour("line"), width: 2 }),
     line(pose ? pose.tool : [], "probe from the pivot to the ball", { color: colour("muted"), width: 6 }),
-    line(axisLines(inputs.machine), "rotary axes", { color: colour("muted"), width: 3, dash: "dash" }),
+    line(pose ? [] : axisLines(inputs.machine), "rotary axes", { color: colour("muted"), width: 3, dash: "dash" }),
     line(arrows, "residual", { color: colour("x"), width: 3 }),
     { type: "scatter3d", mode: "markers", name: "touches", ...columns(tips), customdata: kept, marker: { size: 2, color: colour("y") },
       text: kept.map((i) => `touch ${t.id[i]} of run ${t.run[i]}: ${significant(live.residual_um[i])} µm`), hoverinfo: "text" },
@@ -128,7 +129,7 @@ function draw() {
   // touches and arrows stay large enough to be seen: of a large machine only the middle is shown
   const reach = machine.reduce((far, p) => (p ? Math.max(far, ...p.map((v, k) => Math.abs(v - at[0][k]))) : far), 0);
   const half = Math.max(0.75 * Math.max(...spread, 1), Math.min(reach, 2.5 * Math.max(...spread, 1)));
-  const named = names(inputs.machine, frameOf, 0.25 * half);
+  const named = names(inputs.machine, frameOf, 0.25 * half, !pose);
   traces.push({ type: "scatter3d", mode: "text", name: "names", ...columns(named.map((n) => n.at)), text: named.map((n) => n.says), textfont: { size: 12, color: colour("ink") }, hoverinfo: "skip" });
   const middle = [0, 1, 2].map((k) => {
     let low = Infinity, high = -Infinity;
