@@ -198,16 +198,28 @@ def environment_of(run, warp):
 
 # ---------------------------------------------------------------------------------------------- one run
 
-def read_to_percent(program, last_line):
-    """A program may end with % instead of M2 (which would reset the user's modal state): was its last word executed?"""
+def read_to_percent(program, last_line, logs):
+    """A program may end with % instead of M2 (which would reset the user's modal state): was its end executed?
+
+    Either its last word was seen in execution, which lasts some milliseconds only and may fall between two looks, or the
+    last line that it logs is the last line of a log.
+    """
     with open(program, errors="replace") as f:
         lines = [line.strip() for line in f]
     while lines and not lines[-1]:
         lines.pop()
-    if len(lines) < 2 or lines[0] != "%" or lines[-1] != "%" or not last_line:
+    if len(lines) < 2 or lines[0] != "%" or lines[-1] != "%":
         return False
     words = [n for n, line in enumerate(lines, 1) if line and line[0] not in "%o(;#"]
-    return bool(words) and last_line >= words[-1]
+    if words and last_line and last_line >= words[-1]:
+        return True
+    logged = [line[5:-1].strip() for line in lines if re.fullmatch(r"\(LOG,[^()]*\)", line)]
+    return bool(logged) and "#" not in logged[-1] and any(last_line_of(log) == logged[-1] for log in logs)
+
+
+def last_line_of(path):
+    with open(path, errors="replace") as f:
+        return next((line.strip() for line in reversed(f.readlines()) if line.strip()), None)
 
 
 def parse_g54(text):
@@ -368,7 +380,7 @@ def collect(args, run, own, machine):
     offsets = config.read_var(os.path.join(run, "rig.var"))
     seeded = parse_g54(args.g54) if args.g54 else {**{k: v for k, v in G54.items() if k in machine.letters}, "R": G54_ROTATION}
     # the interpreter reads ahead: that it saw M2 means an end there only if nothing stopped the machine before
-    ended = ((bool(answer.get("read_m2")) or read_to_percent(args.program, answer.get("last_line")))
+    ended = ((bool(answer.get("read_m2")) or read_to_percent(args.program, answer.get("last_line"), [os.path.join(args.out, log) for log in logs]))
              and not answer.get("errors") and not answer.get("failure"))
     def count(pin): return int(pins[pin]) if pin in pins else None
     result = {
