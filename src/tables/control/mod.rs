@@ -6,6 +6,7 @@
 //! position become position tables ([`grids`]). What the control has no place for is left, with the error that it leaves.
 
 pub mod backup;
+mod carried;
 pub mod changes;
 mod files;
 pub mod fill;
@@ -13,26 +14,29 @@ pub mod grids;
 mod left;
 mod old;
 mod replace;
+mod unverified;
 
 use super::compensation::{Compensation, FORMAT, Mode, Tables as Record, Term, Vector};
 use super::correction::{Correction, Limits, rounded};
 use super::kins::Errors;
 use super::lines::{self, Seen};
 use super::linuxcnc::{Left, force, program};
-use super::place::{Place, Spot, along, turns_about_itself};
-use super::restate::{kept_in_words, stated_at};
+use super::restate::kept_in_words;
 use super::rows::TableError;
 use crate::axes::AxisName;
 use crate::diag::{Failure, Finding, Findings, Result};
 use crate::machine::{Axis, Machine, Side};
-use crate::post::tables::{FileForm, Kind, LengthUnit, Tables, Turn, doubt};
+use crate::post::tables::{FileForm, Kind, LengthUnit, Tables, Turn};
 use backup::Old;
+use carried::{Carried, add_angles, carried, with_active};
 use changes::{Change, Division, SHEET};
 pub use files::digits;
 use fill::{Filled, Question, Value};
 use nalgebra::Vector3;
 use replace::Replaced;
 use std::collections::{BTreeMap, BTreeSet};
+pub use unverified::not_run;
+use unverified::say_unverified;
 
 /// How to export.
 #[derive(Debug, Clone)]
@@ -160,71 +164,6 @@ fn workpiece(machine: &Machine) -> Vector3<f64> {
         Some(axis) => axis.point + axis.direction.into_inner() * axis.direction.dot(&(ball - axis.point)),
         None => ball,
     }
-}
-
-/// What the control can hold of the terms, where it holds them, and the rest with the reason.
-struct Carried {
-    /// Terms in lines.
-    terms: Vec<Term>,
-    /// Terms as zero positions.
-    zero: Vec<Term>,
-    /// Where `before` of workpiece-side axes is stated, mm in R.
-    reference_mm: [f64; 3],
-    /// Not held.
-    not: Vec<(Term, String)>,
-    /// Places that a tilt would move, from where the study does not know.
-    kept: Vec<Spot>,
-}
-
-fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -> Carried {
-    let held = directions_of(machine, kind);
-    let tilts = machine.rotary().all(|a| held.contains(&a.name));
-    let angles: BTreeSet<AxisName> = kind.angle.iter().filter_map(|a| axis_of(machine, a.axis)).collect();
-    let reference_mm = if tilts { correction.reference_mm } else { workpiece(machine).into() };
-    // without directions an offset is right at one place only: that of the workpiece
-    let (terms, kept) = stated_at(machine, correction, reference_mm);
-    let last_work = machine.side(Side::Workpiece).filter(|a| a.name.is_rotary()).last().map(|a| a.name);
-    let mut out = Carried { terms: Vec::new(), zero: Vec::new(), reference_mm, not: Vec::new(), kept };
-    for term in terms {
-        let own = turns_about_itself(machine, term.spot());
-        if own && angles.contains(&term.axis) {
-            out.zero.push(term);
-        } else if own && Some(term.axis) == last_work {
-            let why = format!(
-                "a turn of {} about itself turns the workpiece with it: set the work offset of {} again",
-                term.axis, term.axis
-            );
-            out.not.push((term, why));
-        } else if term.dof.is_angle() && !tilts {
-            let why = if own {
-                format!(
-                    "the control's tables have no place for the zero position of {}: it belongs into the reference point of that axis",
-                    term.axis
-                )
-            } else {
-                "the control's tables hold places of rotary axes, no directions".to_owned()
-            };
-            out.not.push((term, why));
-        } else {
-            out.terms.push(term);
-        }
-    }
-    out
-}
-
-fn with_active(terms: &[Term]) -> Vec<Term> {
-    terms.iter().map(|t| Term { value: t.active_before, ..t.clone() }).collect()
-}
-
-/// How much further each axis shows than it stands, in its own count, by a value of the terms, deg.
-fn zero_deg(machine: &Machine, terms: &[Term]) -> BTreeMap<AxisName, f64> {
-    let mut out = BTreeMap::new();
-    for term in terms {
-        let Some(axis) = machine.axis(term.axis) else { continue };
-        let sign = if term.place == Place::Zero { 1.0 } else { along(axis, term.dof).unwrap_or(1.0) };
-        *out.entry(axis.name).or_insert(0.0) -= sign * axis.sense * term.value;
-    }
-    out
 }
 
 /// The tables of a control.
@@ -467,133 +406,6 @@ pub fn export(
     let tables_of = (&filled, &others, &division);
     files::write(machine, tables, kind, &noted, options, tables_of, &mut export)?;
     Ok((export, findings))
-}
-
-/// Zero positions of rotary axes; gives what the control is to hold beyond its old values, deg by axis.
-fn add_angles(
-    machine: &Machine,
-    tables: &Tables,
-    kind: &Kind,
-    carried: &Carried,
-    old: &Old,
-    filled: &mut Filled,
-) -> BTreeMap<AxisName, f64> {
-    let (now, before) = (zero_deg(machine, &carried.zero), zero_deg(machine, &with_active(&carried.zero)));
-    let step = *tables.step_deg.get_ref();
-    let mut out = BTreeMap::new();
-    for form in &kind.angle {
-        let (side, place) = form.axis.place();
-        let Some(axis) = machine.side(side).filter(|a| a.name.is_rotary()).nth(place) else { continue };
-        let (now, before) = (now.get(&axis.name).copied(), before.get(&axis.name).copied().unwrap_or(0.0));
-        let Some(now) = now else { continue };
-        let given_name = form.names.values().find(|n| old.values.contains_key(*n));
-        let given = given_name.and_then(|n| old.values.get(n)).map(|(v, _)| *v);
-        let was = given.unwrap_or(before);
-        let new = rounded(((was + now - before) / step).round() * step);
-        out.insert(axis.name, rounded(new - was + before));
-        filled.values.push(Value {
-            id: form.id.clone(),
-            says: form.says.clone(),
-            names: form.names.clone(),
-            old: rounded(was),
-            new,
-            unit: "deg",
-            decimals: fill::decimals(step),
-            known: given_name.is_some_and(|n| !old.assumed.contains(n)),
-            given: given_name.cloned(),
-            elsewhere: false,
-            instead: false,
-            unverified: doubt(form.source.as_ref(), form.unverified.as_ref()),
-        });
-    }
-    out
-}
-
-/// Entries of the tables for a machine that were not run on a real control: what `--accept-unverified` accepts.
-#[must_use]
-pub fn not_run(machine: &Machine, tables: &Tables, position_tables: bool) -> Vec<String> {
-    let Ok(kind) = kind_of(machine, tables) else { return Vec::new() };
-    let mut out = Vec::new();
-    let mut add = |what: String, source: &Option<String>, unverified: &Option<String>| {
-        if doubt(source.as_ref(), unverified.as_ref()).is_some() {
-            out.push(what);
-        }
-    };
-    add("the tables".to_owned(), &tables.source, &tables.unverified);
-    add(kind_says(kind), &kind.source, &kind.unverified);
-    kind.vector.iter().for_each(|v| add(v.says.clone(), &v.source, &v.unverified));
-    kind.angle.iter().for_each(|a| add(a.says.clone(), &a.source, &a.unverified));
-    if let Some(grid) = tables.grid.as_ref().filter(|_| position_tables) {
-        add("position tables".to_owned(), &grid.source, &grid.unverified);
-    }
-    tables
-        .file
-        .iter()
-        .filter(|f| position_tables || !f.grids)
-        .for_each(|f| add(format!("file {}", f.name), &f.source, &f.unverified));
-    out
-}
-
-/// The key of the machine's kind in the list of what is not verified.
-fn kind_id(kind: &Kind) -> String {
-    format!("kind {}", kind.name)
-}
-
-fn kind_says(kind: &Kind) -> String {
-    format!("entries for the kind \"{}\"", kind.name)
-}
-
-/// What an entry is, in words: its id is a key of the postprocessor's file.
-fn entry_says(kind: &Kind, id: &str) -> String {
-    if id == kind_id(kind) {
-        return kind_says(kind);
-    }
-    let vectors = kind.vector.iter().map(|v| (&v.id, &v.says));
-    let mut all = vectors.chain(kind.angle.iter().map(|a| (&a.id, &a.says)));
-    all.find(|(known, _)| *known == id).map_or_else(|| id.to_owned(), |(_, says)| says.clone())
-}
-
-/// Entries that are not verified, and why: refused, or reported.
-fn say_unverified(
-    tables: &Tables,
-    kind: &Kind,
-    filled: &Filled,
-    (grids, division): (bool, &Division),
-    options: &Options,
-    findings: &mut Findings,
-) -> BTreeMap<String, String> {
-    let mut doubts: Vec<(String, String)> = Vec::new();
-    let mut add = |what: String, why: Option<String>| {
-        if let Some(why) = why {
-            doubts.push((what, why));
-        }
-    };
-    add("the tables".to_owned(), doubt(tables.source.as_ref(), tables.unverified.as_ref()));
-    add(kind_id(kind), doubt(kind.source.as_ref(), kind.unverified.as_ref()));
-    let mut seen = BTreeSet::new();
-    for value in &filled.values {
-        let id = value.id.split('.').next().unwrap_or_default().to_owned();
-        if seen.insert(id.clone()) {
-            add(id, value.unverified.clone());
-        }
-    }
-    if grids && let Some(form) = &tables.grid {
-        add("position tables".to_owned(), doubt(form.source.as_ref(), form.unverified.as_ref()));
-    }
-    for file in tables.file.iter().filter(|f| division.files.contains(&f.name)) {
-        add(format!("file {}", file.name), doubt(file.source.as_ref(), file.unverified.as_ref()));
-    }
-    for (what, why) in &doubts {
-        let message = format!("{}: not verified: {why}", entry_says(kind, what));
-        findings.push(if options.accept_unverified {
-            Finding::warning("tables::unverified", message)
-                .help("compare it with the control's manual and its own backup before you load it")
-        } else {
-            Finding::error("tables::unverified", message)
-                .help("compare it with the control's manual and backup; --accept-unverified writes it all the same")
-        });
-    }
-    doubts.into_iter().collect()
 }
 
 /// The first of some names; a person who needs the rest finds it in the sheet.

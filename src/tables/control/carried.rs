@@ -1,0 +1,118 @@
+//! What a control can hold of the errors that are known, and where it holds them.
+
+use super::backup::Old;
+use super::fill::{self, Filled, Value};
+use super::{axis_of, directions_of, workpiece};
+use crate::axes::AxisName;
+use crate::machine::{Machine, Side};
+use crate::post::tables::{Kind, Tables, doubt};
+use crate::tables::compensation::Term;
+use crate::tables::correction::{Correction, rounded};
+use crate::tables::place::{Place, Spot, along, turns_about_itself};
+use crate::tables::restate::stated_at;
+use std::collections::{BTreeMap, BTreeSet};
+
+/// What the control can hold of the terms, where it holds them, and the rest with the reason.
+pub(super) struct Carried {
+    /// Terms in lines.
+    pub terms: Vec<Term>,
+    /// Terms as zero positions.
+    pub zero: Vec<Term>,
+    /// Where `before` of workpiece-side axes is stated, mm in R.
+    pub reference_mm: [f64; 3],
+    /// Not held.
+    pub not: Vec<(Term, String)>,
+    /// Places that a tilt would move, from where the study does not know.
+    pub kept: Vec<Spot>,
+}
+
+pub(super) fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -> Carried {
+    let held = directions_of(machine, kind);
+    let tilts = machine.rotary().all(|a| held.contains(&a.name));
+    let angles: BTreeSet<AxisName> = kind.angle.iter().filter_map(|a| axis_of(machine, a.axis)).collect();
+    let reference_mm = if tilts { correction.reference_mm } else { workpiece(machine).into() };
+    // without directions an offset is right at one place only: that of the workpiece
+    let (terms, kept) = stated_at(machine, correction, reference_mm);
+    let last_work = machine.side(Side::Workpiece).filter(|a| a.name.is_rotary()).last().map(|a| a.name);
+    let mut out = Carried { terms: Vec::new(), zero: Vec::new(), reference_mm, not: Vec::new(), kept };
+    for term in terms {
+        let own = turns_about_itself(machine, term.spot());
+        if own && angles.contains(&term.axis) {
+            out.zero.push(term);
+        } else if own && Some(term.axis) == last_work {
+            let why = format!(
+                "a turn of {} about itself turns the workpiece with it: set the work offset of {} again",
+                term.axis, term.axis
+            );
+            out.not.push((term, why));
+        } else if term.dof.is_angle() && !tilts {
+            let why = if own {
+                format!(
+                    "the control's tables have no place for the zero position of {}: it belongs into the reference point of that axis",
+                    term.axis
+                )
+            } else {
+                "the control's tables hold places of rotary axes, no directions".to_owned()
+            };
+            out.not.push((term, why));
+        } else {
+            out.terms.push(term);
+        }
+    }
+    out
+}
+
+pub(super) fn with_active(terms: &[Term]) -> Vec<Term> {
+    terms.iter().map(|t| Term { value: t.active_before, ..t.clone() }).collect()
+}
+
+/// How much further each axis shows than it stands, in its own count, by a value of the terms, deg.
+fn zero_deg(machine: &Machine, terms: &[Term]) -> BTreeMap<AxisName, f64> {
+    let mut out = BTreeMap::new();
+    for term in terms {
+        let Some(axis) = machine.axis(term.axis) else { continue };
+        let sign = if term.place == Place::Zero { 1.0 } else { along(axis, term.dof).unwrap_or(1.0) };
+        *out.entry(axis.name).or_insert(0.0) -= sign * axis.sense * term.value;
+    }
+    out
+}
+
+/// Zero positions of rotary axes; gives what the control is to hold beyond its old values, deg by axis.
+pub(super) fn add_angles(
+    machine: &Machine,
+    tables: &Tables,
+    kind: &Kind,
+    carried: &Carried,
+    old: &Old,
+    filled: &mut Filled,
+) -> BTreeMap<AxisName, f64> {
+    let (now, before) = (zero_deg(machine, &carried.zero), zero_deg(machine, &with_active(&carried.zero)));
+    let step = *tables.step_deg.get_ref();
+    let mut out = BTreeMap::new();
+    for form in &kind.angle {
+        let (side, place) = form.axis.place();
+        let Some(axis) = machine.side(side).filter(|a| a.name.is_rotary()).nth(place) else { continue };
+        let (now, before) = (now.get(&axis.name).copied(), before.get(&axis.name).copied().unwrap_or(0.0));
+        let Some(now) = now else { continue };
+        let given_name = form.names.values().find(|n| old.values.contains_key(*n));
+        let given = given_name.and_then(|n| old.values.get(n)).map(|(v, _)| *v);
+        let was = given.unwrap_or(before);
+        let new = rounded(((was + now - before) / step).round() * step);
+        out.insert(axis.name, rounded(new - was + before));
+        filled.values.push(Value {
+            id: form.id.clone(),
+            says: form.says.clone(),
+            names: form.names.clone(),
+            old: rounded(was),
+            new,
+            unit: "deg",
+            decimals: fill::decimals(step),
+            known: given_name.is_some_and(|n| !old.assumed.contains(n)),
+            given: given_name.cloned(),
+            elsewhere: false,
+            instead: false,
+            unverified: doubt(form.source.as_ref(), form.unverified.as_ref()),
+        });
+    }
+    out
+}
