@@ -2,8 +2,6 @@
 
 use crate::edits;
 
-use axiscal::diag::source;
-use axiscal::post::{Postprocessor, parse};
 use edits::{Fate, original};
 
 const CONTROLLERS: [&str; 7] =
@@ -35,7 +33,7 @@ fn every_random_edit_is_refused_or_moves_identically() {
 }
 
 /// The first line that begins with a text, replaced.
-fn with(text: &str, begins: &str, nth: usize, instead: &dyn Fn(&str) -> String) -> String {
+pub(super) fn with(text: &str, begins: &str, nth: usize, instead: &dyn Fn(&str) -> String) -> String {
     let mut seen = 0;
     let mut done = false;
     let lines = text.split_inclusive('\n').map(|line| {
@@ -130,114 +128,6 @@ fn edits_by_hand_of_a_program_for_a_package_are_caught() {
     }
 }
 
-/// Lines from the first that begins with one text up to and with the next that begins with another, taken out.
-fn without(text: &str, begins: &str, nth: usize, ends: &str) -> String {
-    let lines: Vec<&str> = text.split_inclusive('\n').collect();
-    let first = lines.iter().enumerate().filter(|(_, l)| l.starts_with(begins)).nth(nth - 1).unwrap().0;
-    let last = first + lines[first..].iter().position(|l| l.starts_with(ends)).unwrap();
-    lines[..first].iter().chain(&lines[last + 1..]).copied().collect()
-}
-
-#[test]
-fn edits_by_hand_of_a_klartext_program_are_caught() {
-    let mut original = original("heidenhain", None);
-    let t = original.without_numbers();
-    let fast = with(&t, "L X+Q1671", 1, &|l| l.replace("FQ1699", "FMAX"));
-    let not_oriented = with(&t, "M19", 1, &|_| String::new());
-    for text in [fast, not_oriented] {
-        assert_eq!(original.codes(&original.numbered(&text)), ["check::changed"]);
-    }
-    // all the others are refused for what they do, with nothing to compare with but the plan's touches
-    original.plan.programs.clear();
-    let probe = "TCH PROBE 4.0";
-    // the last one is that of a guarded move
-    let stops = t.lines().filter(|l| l.trim_end() == "FN 9: IF +0 EQU +0 GOTO LBL 9").count();
-    let turn = with(&t, "L B-35", 1, &|l| format!("L Z-20 R0 FMAX M91\r\n{l}"));
-    let mut wrong = Vec::new();
-    for (what, text, code) in [
-        ("a sign changed", with(&t, "FN 0: Q1651 = -", 1, &|l| l.replace("= -", "= +")), "check::unknown_start"),
-        ("a lift by a tenth", with(&t, "FN 0: Q1653 = +11.3", 1, &|l| l.replace("11.3", "1.13")), "check::collision"),
-        ("a zero lost", with(&t, "FN 0: Q1653 = +10", 1, &|l| l.replace("10", "1")), "check::stops"),
-        (
-            "FMAX in a search",
-            with(&t, "TCH PROBE 4.3 DIST+Q1684 FQ1665", 1, &|l| l.replace("FQ1665", "FMAX")),
-            "check::not_understood",
-        ),
-        (
-            "FMAX in a guarded move",
-            with(&t, "TCH PROBE 4.3 DIST+Q1684 FQ1699", 1, &|l| l.replace("FQ1699", "FMAX")),
-            "check::not_understood",
-        ),
-        ("a guarded move without its cycle", without(&t, probe, 5, "TCH PROBE 4.3"), "check::unguarded"),
-        ("a block of a cycle lost", with(&t, "TCH PROBE 4.2", 3, &|_| String::new()), "check::not_understood"),
-        ("a search lost", without(&t, probe, 2, "TCH PROBE 4.3"), "check::stops"),
-        ("a call lost", with(&t, "CALL LBL 1\r", 1, &|_| String::new()), "check::touch_lacking"),
-        (
-            "a search beyond the block",
-            with(&t, "FN 0: Q1663 = -4\r", 1, &|l| l.replace("-4", "-40")),
-            "check::not_the_plan",
-        ),
-        (
-            "a search at ten times its feed",
-            with(&t, "FN 0: Q1665 = +60\r", 2, &|l| l.replace("+60", "+600")),
-            "check::feed",
-        ),
-        ("a retract removed", without(&t, "Q1614", 1, "L X"), "check::in_contact"),
-        (
-            "a line of the log removed",
-            with(&t, "FN 16: F-PRINT TNC:\\AXISCAL\\SMALL_P.A", 1, &|_| String::new()),
-            "check::log",
-        ),
-        ("a stop removed", with(&t, "FN 9: IF +0 EQU +0 GOTO LBL 9\r", stops, &|_| String::new()), "check::goes_on"),
-        ("the tilted plane of before", with(&t, "PLANE RESET", 1, &|_| String::new()), "check::not_run"),
-        ("M128 of before", with(&t, "M129", 1, &|_| String::new()), "check::not_run"),
-        ("machine coordinates lost", with(&t, "L X-", 1, &|l| l.replace(" M91", "")), "check::start"),
-        ("a turn below the clearance", turn, "check::turn_not_clear"),
-        (
-            "a remark that takes the next block in",
-            with(&t, ";", 2, &|l| format!("{} ~\r\n", l.trim_end())),
-            "check::not_understood",
-        ),
-        ("a label that the control lacks", all(&t, "LBL 9\r", "LBL 99999\r"), "check::not_understood"),
-    ] {
-        let codes = original.codes(&original.numbered(&text));
-        if !codes.contains(&code) {
-            wrong.push(format!("{what}: {codes:?}"));
-        }
-    }
-    assert!(wrong.is_empty(), "{wrong:#?}");
-    // a block number that is missing shows that a line is
-    assert_eq!(original.codes(&with(&original.text, "90 ", 1, &|_| String::new())), ["check::not_understood"]);
-}
-
-#[test]
-fn masks_are_a_part_of_a_klartext_program() {
-    let mut original = original("heidenhain", None);
-    let written = original.beside.clone();
-    for (what, mask, from, to, code) in [
-        ("two columns exchanged", "SMALL_P.A", "Q1621,Q1622", "Q1622,Q1621", "check::log"),
-        ("decimals", "SMALL_P.A", "X%10.4LF", "X%10.3LF", "check::log"),
-        ("it writes over the log", "SMALL_P.A", "M_APPEND", "M_TRUNCATE", "check::log"),
-        ("it keeps the log in memory", "SMALL_P.A", "M_CLOSE;", "", "check::not_understood"),
-        ("a form too few", "SMALL_P.A", " Y%10.4LF", "", "check::not_understood"),
-        ("no end of the log", "SMALL_E.A", "E N", "X N", "check::log"),
-        ("a message without its text", "AXISCAL_M.A", "%S", "%1.0LF", "check::not_understood"),
-    ] {
-        original.beside = written
-            .iter()
-            .map(|(name, text)| {
-                let edited = if name == mask { text.inner().replace(from, to) } else { text.inner().clone() };
-                assert!(name != mask || edited != *text.inner(), "{what}");
-                (name.clone(), axiscal::diag::source(name, edited))
-            })
-            .collect();
-        let codes = original.codes(&original.text);
-        assert!(codes.contains(&code), "{what}: {codes:?}");
-    }
-    original.beside.clear();
-    assert_eq!(original.codes(&original.text), ["check::not_understood"]);
-}
-
 #[test]
 fn a_run_that_starts_again_meets_each_block_slowly() {
     for (controller, slow, fast) in [
@@ -293,7 +183,7 @@ fn first_other_line(one: &str, two: &str) -> usize {
 }
 
 /// Every place that holds a text, with what stands there instead.
-fn all(text: &str, from: &str, to: &str) -> String {
+pub(super) fn all(text: &str, from: &str, to: &str) -> String {
     assert!(text.contains(from), "{from:?} does not stand in the program");
     text.replace(from, to)
 }
@@ -469,149 +359,6 @@ fn a_program_that_does_not_look_at_the_number_of_the_set_up_is_found() {
         };
         let codes = original.codes(&edited);
         assert!(codes.contains(&"check::start"), "{controller}: {codes:?}");
-    }
-}
-
-/// A variant of a built-in controller: its file with these lines.
-fn variant(base: &str, lines: &str) -> Result<Postprocessor, axiscal::diag::Failure> {
-    let text = format!("format = \"axiscal-postprocessor/1\"\nbased_on = {base:?}\nname = \"mine\"\n{lines}");
-    parse(&source("mine.toml", text)).map(|(post, _)| post)
-}
-
-/// Values that a builder or a user may give each setting, as the guide and the files name them.
-const SETTINGS: [(&[&str], &str, &[&str]); 43] = [
-    (&["fanuc", "haas"], "touch_program", &["7001"]),
-    (&["fanuc", "haas"], "guarded_program", &["7002"]),
-    (&["fanuc", "haas"], "rapid_program", &["7003"]),
-    (&["fanuc", "haas"], "stopped_in", &["#100", "#599"]),
-    (&["fanuc", "haas"], "found_x", &["#100"]),
-    (&["sinumerik"], "found_x", &["R1"]),
-    (&["fanuc", "haas"], "found_y", &["#100"]),
-    (&["sinumerik"], "found_y", &["R1"]),
-    (&["fanuc", "haas"], "found_z", &["#100"]),
-    (&["sinumerik"], "found_z", &["R1"]),
-    (&["fanuc", "haas"], "found_off", &["#100"]),
-    (&["sinumerik"], "found_off", &["R1"]),
-    (&["fanuc", "haas"], "found_room", &["#100"]),
-    (&["sinumerik"], "found_room", &["R1"]),
-    (&["fanuc", "haas"], "last_alarm", &["99"]),
-    (&["fanuc", "haas"], "dry_run", &["no"]),
-    (&["fanuc", "haas"], "program_number", &["1234"]),
-    (&["fanuc", "haas", "heidenhain", "sinumerik", "linuxcnc"], "triggered_within", &["0.08"]),
-    (&["fanuc", "haas"], "missed_within", &["0.03"]),
-    (&["fanuc", "haas", "sinumerik", "linuxcnc"], "release_feed", &["200"]),
-    (&["fanuc", "haas"], "orient", &["", "M119 R", "M19 S", "M19 P"]),
-    (&["heidenhain", "sinumerik", "linuxcnc"], "orient", &["no"]),
-    (&["fanuc", "haas"], "probe_on", &["M101", "M59 P2", "M59 P1133", "M101\nM59 P1133"]),
-    (&["fanuc", "haas"], "probe_off", &["M102", "M69 P2"]),
-    (&["fanuc", "haas"], "probe_input", &["#1004", "#1032", "#11004"]),
-    (&["fanuc", "haas"], "cancel", &["G69 G40 G80"]),
-    (&["haas"], "dynamic_offset", &[""]),
-    (&["fanuc"], "wait", &["M53", "G53"]),
-    (&["haas"], "wait", &["M53", "G4 P500"]),
-    (&["haas"], "read_ahead", &["G103 P1\nG4 P1"]),
-    (&["fanuc", "haas", "heidenhain", "sinumerik"], "modulo", &["C"]),
-    (&["fanuc", "haas", "sinumerik"], "time", &["no"]),
-    (&["fanuc", "haas"], "tool_offset", &["5"]),
-    (&["heidenhain", "sinumerik"], "probe_on", &["M27"]),
-    (&["heidenhain", "sinumerik"], "probe_off", &["M28"]),
-    (&["heidenhain"], "folder", &["TNC:\\PROBE\\"]),
-    (&["heidenhain"], "cancel", &["M129\nPLANE RESET STAY\nM127"]),
-    (&["sinumerik"], "probe", &["2"]),
-    (&["sinumerik"], "tool_edge", &["D2"]),
-    (&["linuxcnc"], "version", &["master"]),
-    (&["linuxcnc"], "probe_on", &["M64 P0"]),
-    (&["linuxcnc"], "probe_off", &["M65 P0"]),
-    (&["fanuc-inspection-plus", "haas-inspection-plus"], "probe_input", &["#1004"]),
-];
-
-/// With --tcp only, and of the templates of that.
-const OF_TCP: [&str; 2] = ["tcp", "tool_length"];
-
-#[test]
-fn every_setting_can_be_what_its_file_says() {
-    for base in ["fanuc", "haas", "heidenhain", "sinumerik", "linuxcnc"] {
-        let (post, _) = Postprocessor::load_built_in_or_file(base).unwrap();
-        // texts of messages are tried below, all at once
-        let is_tried = |n: &&String| !OF_TCP.contains(&n.as_str()) && !n.starts_with("text_");
-        for name in post.settings.keys().filter(is_tried) {
-            assert!(SETTINGS.iter().any(|(of, n, _)| of.contains(&base) && n == name), "{base}: {name} is not tried");
-        }
-    }
-    for base in ["fanuc", "haas"] {
-        let (post, _) = Postprocessor::load_built_in_or_file(base).unwrap();
-        let texts = post.settings.keys().filter(|n| n.starts_with("text_"));
-        let lines: String = texts.map(|n| format!("{n} = \"ours (no {})\"\n", n.len())).collect();
-        assert!(lines.lines().count() > 5, "{base}: {lines}");
-        edits::of(variant(base, &format!("[settings]\n{lines}")).unwrap_or_else(|e| panic!("{e}")), None);
-    }
-    for (of, name, values) in SETTINGS {
-        for (base, value) in of.iter().flat_map(|base| values.iter().map(move |v| (base, v))) {
-            let post = variant(base, &format!("[settings]\n{name} = {value:?}\n")).unwrap_or_else(|e| panic!("{e}"));
-            // it is clean, or this says what is wrong
-            let original = edits::of(post, None);
-            if *name == *"probe_input" {
-                assert!(original.text.contains(&format!("{value}EQ0")), "{base}: {value} is not asked");
-            }
-        }
-    }
-}
-
-/// What no setting names is not the builder's, nor is what means the same to every control.
-#[test]
-fn what_no_setting_names_is_refused() {
-    for base in ["fanuc", "haas"] {
-        let with = |lines: &str| edits::of(variant(base, &format!("[settings]\n{lines}\n")).unwrap(), None);
-        let original = with("probe_on = \"M59 P2\"");
-        for other in ["M59 P3", "M59", "M58 P2", "M59 P2 R1"] {
-            let codes = original.codes(&original.text.replacen("M59 P2\n", &format!("{other}\n"), 1));
-            assert!(!codes.is_empty(), "{base}: {other}");
-        }
-        let original = with("orient = \"M119 R\"");
-        assert!(original.codes(&original.text.replacen("M119 R", "M19 R", 1)).contains(&"check::not_run"), "{base}");
-        // a look at the probe that does not lead to the stop
-        let original = with("probe_input = \"#1004\"");
-        assert!(!original.codes(&original.text.replacen("#1004EQ0", "#1004EQ1", 1)).is_empty(), "{base}");
-        assert!(!original.codes(&original.text.replace("#1004", "#1005")).is_empty(), "{base}");
-    }
-    let original = edits::of(variant("heidenhain", "[settings]\nprobe_on = \"M27\"\n").unwrap(), None);
-    assert!(!original.codes(&original.text.replacen("M27", "M26", 1)).is_empty());
-}
-
-/// Whatever number of decimals the log has, its fields hold what is written into them.
-#[test]
-fn the_fields_of_a_log_follow_its_decimals() {
-    for base in ["fanuc", "haas"] {
-        for (decimals, field, modulo) in [(3, "[53]", "100000."), (4, "[44]", "10000."), (5, "[35]", "1000.")] {
-            let lines = format!("[log]\ndecimals = {decimals}\nunverified = \"ours\"\n");
-            let original = edits::of(variant(base, &lines).unwrap(), None);
-            let taken = format!("#33=#33-{modulo}*FIX[#33/{modulo}]");
-            assert!(
-                original.text.contains(&format!("K#33{field}")) && original.text.contains(&taken),
-                "{base} {decimals}"
-            );
-        }
-        // a field that is too narrow: Fanuc loses the first places of what is written into it
-        let original = edits::of(variant(base, "[log]\ndecimals = 5\nunverified = \"ours\"\n").unwrap(), None);
-        let narrow = original.text.replace("X#27[35]", "X#27[15]");
-        assert_ne!(narrow, original.text);
-        assert_eq!(original.codes(&narrow).contains(&"check::log"), base == "fanuc", "{base}");
-        let text = original.text.replace("K#33[35]", "K#33[45]");
-        assert_eq!(original.finding(&text).0, "check::not_understood", "{base}");
-        assert!(original.finding(&text).2.contains("9 places"), "{base}");
-        // a file that does not fit together
-        let lines = "[log]\ndecimals = 5\nwhole_places = 3\ncheck_modulo = 10000.0\nunverified = \"ours\"\n";
-        let refused = variant(base, lines).unwrap_err();
-        assert!(refused.0.iter().any(|f| f.code == "post::check_modulo"), "{refused}");
-    }
-}
-
-#[test]
-fn inches_need_four_decimals() {
-    for base in ["fanuc", "haas", "fanuc-inspection-plus", "haas-inspection-plus"] {
-        let refused = variant(base, "[log]\nunit = \"inch\"\nunverified = \"ours\"\n").unwrap_err();
-        let finding = refused.0.iter().find(|f| f.code == "post::inch_decimals").unwrap_or_else(|| panic!("{refused}"));
-        assert!(finding.help.as_ref().is_some_and(|h| h.contains("[number] decimals = 4")), "{finding}");
     }
 }
 

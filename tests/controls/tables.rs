@@ -6,6 +6,7 @@ mod backups;
 mod by_hand;
 mod component;
 mod controls;
+mod each_parameter;
 mod export;
 mod hand;
 mod mapping;

@@ -16,3 +16,4 @@ mod start_page;
 mod terminal;
 mod torture;
 mod workbench;
+mod workbench_requests;

@@ -1,9 +1,9 @@
-//! What a fit says about its own doubt: noise from repeats and revisits, touches that do not belong, type B rows,
-//! another reference point, priors counted once, weak combinations.
+//! What a fit says about its own doubt: noise from repeats and revisits, type B rows, another reference point, priors
+//! counted once.
 
 use crate::common;
 use axiscal::fit::outcome::{Outcome, Status};
-use axiscal::fit::{Fit, Knowledge, Mask, NoiseSource, Remark, Settings, VisitSource, uncertainty};
+use axiscal::fit::{Fit, Knowledge, NoiseSource, Remark, Settings, VisitSource, uncertainty};
 use axiscal::log::Touch;
 use axiscal::machine::Machine;
 use axiscal::model::catalogue::Catalogue;
@@ -12,10 +12,10 @@ use axiscal::program::plan::Plan;
 use axiscal::simulate::Scenario;
 use common::*;
 
-const MODEL: [&str; 4] = ["location-b", "location-c", "block-setup", "pretravel"];
+pub(super) const MODEL: [&str; 4] = ["location-b", "location-c", "block-setup", "pretravel"];
 
 /// The paper's two runs on a slightly wrong machine with 1 um of noise.
-fn measured(machine: &Machine, seed: u64) -> Vec<(Plan, Vec<Touch>)> {
+pub(super) fn measured(machine: &Machine, seed: u64) -> Vec<(Plan, Vec<Touch>)> {
     let scenario = Scenario::flawless()
         .with(machine, "location-b", &[("EX0B", 0.01), ("EA0B", 0.002)])
         .unwrap()
@@ -25,121 +25,13 @@ fn measured(machine: &Machine, seed: u64) -> Vec<(Plan, Vec<Touch>)> {
     ["head", "table"].map(|p| plan(machine, p)).map(|p| (p.clone(), touch(machine, &p, &scenario, None))).into()
 }
 
-fn fit(machine: &Machine, runs: &[(Plan, Vec<Touch>)], effects: &[&str], settings: Settings) -> Fit {
+pub(super) fn fit(machine: &Machine, runs: &[(Plan, Vec<Touch>)], effects: &[&str], settings: Settings) -> Fit {
     let runs: Vec<(&Plan, &[Touch])> = runs.iter().map(|(p, t)| (p, &t[..])).collect();
     identify_with(machine, &runs, effects, settings)
 }
 
-fn sigma(o: &Outcome, name: &str) -> f64 {
+pub(super) fn sigma(o: &Outcome, name: &str) -> f64 {
     o.parameters.iter().find(|p| p.name == name).unwrap().sigma.unwrap()
-}
-
-/// Pushes a touch along its approach: a chip keeps the ball off the face.
-fn chip(run: &mut (Plan, Vec<Touch>), index: usize, by_mm: f64) {
-    let planned = run.0.touch(run.1[index].id).unwrap();
-    let (start, end) = (planned.start_position(), planned.end_position());
-    let way: Vec<f64> = (0..3).map(|k| start.0[k] - end.0[k]).collect();
-    let length = way.iter().map(|w| w * w).sum::<f64>().sqrt();
-    for (at, w) in run.1[index].position.0.iter_mut().zip(&way) {
-        *at += by_mm * w / length;
-    }
-}
-
-#[test]
-fn a_chip_is_rejected_with_its_size_and_the_rest_is_left_alone() {
-    let machine = machine("swivel-head");
-    let clean = measured(&machine, 5);
-    let whole = fit(&machine, &clean, &MODEL, Settings::default());
-    assert!(whole.rejected.len() <= 1, "{:?}", whole.rejected);
-    let mut runs = clean.clone();
-    for (run, index, by) in [(0, 17, 0.012), (0, 18, 0.5), (1, 60, 0.03), (1, 100, -0.015)] {
-        chip(&mut runs[run], index, by);
-    }
-    let spoiled = fit(&machine, &runs, &MODEL, Settings::default());
-    let o = &spoiled.outcome;
-    for (run, index) in [(0, 17), (0, 18), (1, 60), (1, 100)] {
-        let id = runs[run].1[index].id;
-        let found = o.rejected.iter().find(|r| r.run == run + 1 && r.id == id);
-        assert!(found.is_some_and(|r| r.reason.contains("µm off")), "{id} of run {run}: {:?}", o.rejected);
-    }
-    assert!(o.rejected.len() <= 5, "{:?}", o.rejected);
-    assert!(o.rms_um < 1.1 && (o.chi2_per_dof - 1.0).abs() < 0.25, "{} {}", o.rms_um, o.chi2_per_dof);
-    // a rejected touch stays in the data, and says so
-    assert_eq!(o.touches, 356);
-    let residuals = o.residuals.as_ref().unwrap();
-    assert_eq!(residuals.iter().filter(|r| !r.used).count(), o.rejected.len());
-    for name in ["EX0B", "EY0C"] {
-        assert!((value(&spoiled, name) - value(&whole, name)).abs() < 0.5 * sigma(&whole.outcome, name), "{name}");
-    }
-}
-
-#[test]
-fn too_many_strangers_and_whole_faces_are_findings() {
-    let machine = machine("swivel-head");
-    let mut runs = measured(&machine, 6);
-    // a whole face of one block in one pose: something in common, not chips
-    let face: Vec<usize> = {
-        let first = runs[1].0.touch(runs[1].1[0].id).unwrap().clone();
-        let same = |t: &Touch| {
-            let p = runs[1].0.touch(t.id).unwrap();
-            p.normal == first.normal && p.pose == first.pose && p.block == first.block
-        };
-        (0..runs[1].1.len()).filter(|&i| same(&runs[1].1[i])).collect()
-    };
-    assert!(face.len() >= 3);
-    for &i in &face {
-        chip(&mut runs[1], i, 0.02);
-    }
-    let spoiled = fit(&machine, &runs, &MODEL, Settings::default());
-    let rejected = spoiled.rejected.len();
-    assert!(rejected < face.len(), "{rejected} of {} touches of a face were thrown away together", face.len());
-    assert!(spoiled.remarks.iter().any(|r| matches!(r, Remark::Misfit { .. })), "{:?}", spoiled.outcome.warnings);
-
-    // the cap holds, and what the robust fit found is said
-    let found = spoiled.remarks.iter().any(|r| matches!(r, Remark::OutliersBeyond { .. }));
-    assert_eq!(found, spoiled.outliers_beyond.is_some());
-}
-
-/// Many gross touches strewn over the faces are left out, all of them, and the values are those of the rest; that they are
-/// many is a finding all the same.
-#[test]
-fn many_strangers_do_not_make_the_values_wrong() {
-    let machine = machine("swivel-head");
-    for (seed, every, sizes) in [(7, 18, [0.03, 0.5]), (8, 9, [0.03, 0.08]), (9, 7, [-0.05, 0.3])] {
-        let clean = measured(&machine, seed);
-        let whole = fit(&machine, &clean, &MODEL, Settings::default());
-        let mut runs = clean.clone();
-        let mut bad = Vec::new();
-        let mut touch = seed as usize;
-        while touch < 356 {
-            let (run, index) = if touch < 202 { (0, touch) } else { (1, touch - 202) };
-            chip(&mut runs[run], index, sizes[bad.len() % 2]);
-            bad.push((run + 1, runs[run].1[index].id));
-            // not in step with the faces
-            touch += every - 2 + (touch * 7) % 5;
-        }
-        let o = fit(&machine, &runs, &MODEL, Settings::default());
-        let rejected: Vec<(usize, u64)> = o.outcome.rejected.iter().map(|r| (r.run, r.id)).collect();
-        assert!(bad.iter().all(|b| rejected.contains(b)), "{seed}: {bad:?} {rejected:?}");
-        assert!(rejected.len() <= bad.len() + 2, "{seed}: {} of {}", rejected.len(), bad.len());
-        assert!((o.outcome.chi2_per_dof - 1.0).abs() < 0.3, "{}", o.outcome.chi2_per_dof);
-        for p in o.outcome.parameters.iter().filter(|p| !p.name.contains('@')) {
-            let off = (p.value - value(&whole, &p.name)).abs();
-            assert!(off < 1.5 * p.sigma.unwrap(), "{seed} {}: {off} {:?}", p.name, p.sigma);
-        }
-        assert!(o.remarks.contains(&Remark::ManyOutliers { excluded: rejected.len(), of: 356 }), "{:?}", o.remarks);
-    }
-}
-
-#[test]
-fn a_masked_touch_is_not_used() {
-    let machine = machine("swivel-head");
-    let mut runs = measured(&machine, 8);
-    chip(&mut runs[0], 3, 0.2);
-    let id = runs[0].1[3].id;
-    let settings = Settings { masked: vec![Mask { run: 0, id, reason: "coolant".into() }], ..Settings::default() };
-    let o = fit(&machine, &runs, &MODEL, settings).outcome;
-    assert!(o.rejected.iter().any(|r| r.id == id && r.reason.contains("coolant")), "{:?}", o.rejected);
 }
 
 #[test]
@@ -242,73 +134,6 @@ fn priors_are_shown_and_counted_once() {
     assert!((sigma(&o, "EX0B") / expected - 1.0).abs() < 1e-3);
 }
 
-#[test]
-fn weak_combinations_are_named() {
-    // effects.md, B.1: on the paper's plan the squareness of Z hides behind the tilt of the head
-    let machine = machine("swivel-head");
-    let runs = measured(&machine, 13);
-    let effects = [&MODEL[..], &["squareness-yz", "squareness-zx", "scale-z"]].concat();
-    let o = fit(&machine, &runs, &effects, Settings::default()).outcome;
-    assert!(o.weak.iter().any(|w| w.combination.contains_key("EA0Z")), "{:?}", o.weak);
-    let pair = o.correlations.iter().any(|c| [&c.a, &c.b].contains(&&"EA0Z".to_owned()) && c.r.abs() > 0.9);
-    assert!(pair, "{:?}", o.correlations);
-    assert!(o.parameters.iter().all(|p| p.status == Status::Identified || p.sigma.is_none()));
-}
-
-#[test]
-fn noise_does_not_make_a_null_direction_look_seen() {
-    // a uniform scale of the machine is the head's length and the ball's radius (effects.md, B.1)
-    let machine = machine("swivel-head");
-    let runs = measured(&machine, 14);
-    let effects = [&MODEL[..], &["scale-x", "scale-y", "scale-z"]].concat();
-    let o = fit(&machine, &runs, &effects, Settings::default()).outcome;
-    assert_eq!((o.unknowns, o.rank), (42, 41));
-    assert!(o.undetermined.iter().any(|u| u.combination.contains_key("EXX") && u.combination.contains_key("EZ0B")));
-    assert!(o.chi2_per_dof > 0.8, "{}", o.chi2_per_dof);
-    // what is identified is known to its usual size times a few: no millimetre, no degree
-    for p in o.parameters.iter().filter(|p| p.status == Status::Identified) {
-        let most = match p.unit.as_str() {
-            "mm" => 0.1,
-            "deg" => 0.1,
-            "um/m" => 1e3,
-            other => panic!("{}: {other}", p.name),
-        };
-        assert!(p.sigma.is_some_and(|s| s > 0.0 && s < most), "{}: {:?} {}", p.name, p.sigma, p.unit);
-    }
-}
-
-#[test]
-fn touches_that_are_all_taken_out_tell_nothing() {
-    let machine = machine("swivel-head");
-    let runs = measured(&machine, 15);
-    let mask = |run: usize, t: &Touch| Mask { run, id: t.id, reason: "all".into() };
-    let all: Vec<Mask> = runs.iter().enumerate().flat_map(|(r, run)| run.1.iter().map(move |t| mask(r, t))).collect();
-    for masked in [all.clone(), all[10..].to_vec()] {
-        let o = fit(&machine, &runs, &MODEL, Settings { masked, ..Settings::default() }).outcome;
-        assert!(o.rank <= 10, "{}", o.rank);
-        assert!(o.parameters.iter().all(|p| p.sigma.is_none_or(f64::is_finite)));
-        assert!(o.parameters.iter().any(|p| p.status == Status::Undetermined));
-    }
-    let masked = vec![Mask { run: 0, id: 99_999, reason: "typo".into() }];
-    let o = fit(&machine, &runs, &MODEL, Settings { masked, ..Settings::default() }).outcome;
-    assert!(o.warnings.iter().any(|w| w.contains("99999")), "{:?}", o.warnings);
-}
-
-/// effects.md, B.1: the head alone has rank 29 and condition 14.2, the table alone 13 and 3.0.
-#[test]
-fn each_program_alone_is_as_well_conditioned_as_the_design_study_says() {
-    let machine = machine("swivel-head");
-    let both = measured(&machine, 21);
-    for (run, effects, rank, condition) in
-        [(0, &["location-b", "block-setup", "pretravel"][..], 29, 14.2), (1, &MODEL[..], 13, 3.0)]
-    {
-        let o = fit(&machine, &both[run..=run], effects, Settings::default()).outcome;
-        println!("{} {}", o.rank, o.condition);
-        assert_eq!(o.rank, rank);
-        assert!((o.condition - condition).abs() < 0.15, "{}", o.condition);
-    }
-}
-
 /// A type B row that goes with the temperature counts per kelvin where no touch carries one, and says so.
 #[test]
 fn a_temperature_row_without_temperatures_is_not_zero() {
@@ -369,49 +194,6 @@ fn the_doubt_of_the_thermometer_is_a_row_of_its_own() {
     assert!((of(&whole) / of(&half) - 2.0).abs() < 1e-9);
 }
 
-/// A pitch of an amplitude that the touches do not show cannot be told, and takes nothing else with it.
-#[test]
-fn a_pitch_of_nothing_leaves_the_errors_told() {
-    let machine = machine("swivel-head");
-    for seed in 30..30 + common::count(2, 4) {
-        let runs = measured(&machine, seed);
-        for pitch in ["pitch-x", "pitch-y", "warm-up"] {
-            let o = fit(&machine, &runs, &[&MODEL[..], &[pitch]].concat(), Settings::default()).outcome;
-            for name in ["EX0B", "EZ0B", "EA0B", "EC0B", "EX0C", "EY0C", "EA0C", "EB0C"] {
-                let p = o.parameters.iter().find(|p| p.name == name).unwrap();
-                assert!(p.status == Status::Identified, "{seed} {pitch}: {name} is {:?}; {:?}", p.status, o.warnings);
-            }
-        }
-    }
-}
-
-/// A combination that is nearly, but not quite, without a trace is said too: an effect that differs from the place of C by
-/// a ten-millionth only.
-#[test]
-fn nothing_falls_between_weak_and_unseen() {
-    let machine = machine("swivel-head");
-    let runs = measured(&machine, 23);
-    for share in ["1e-5", "1e-6", "1e-7"] {
-        let mut catalogue = Catalogue::built_in().unwrap();
-        let text = format!(
-            "[[effect]]\nid = \"near\"\nname = \"Nearly the same\"\nat = \"C\"\nterms = [{{ parameter = \"near\", unit = \"um\", dof = \"dx\", formula = \"1 + {share}*cos(3*C)\", typical = 16 }}]\n"
-        );
-        catalogue.add_file(&axiscal::diag::source("near.toml", &text)).unwrap();
-        let runs: Vec<Run> =
-            runs.iter().map(|(plan, touches)| Run { plan, touches, mounting: None, started_s: None }).collect();
-        let effects = MODEL.iter().copied().chain(["near"]).map(str::to_owned).collect();
-        let o = axiscal::fit::identify(&machine, &catalogue, &runs, &Settings { effects, ..Settings::default() })
-            .unwrap()
-            .outcome;
-        let weak = o.weak.iter().find(|w| w.combination.contains_key("near") && w.combination.contains_key("EX0C"));
-        let unseen = o.undetermined.iter().any(|u| u.combination.contains_key("near"));
-        println!("{share}: {weak:?} {unseen}");
-        let weak = weak.unwrap_or_else(|| panic!("{share}: {:?} {:?}", o.weak, o.undetermined));
-        assert!(weak.times_typical > 100.0 && !unseen);
-        assert!(weak.says.contains("the position of axis C in X (EX0C)"), "{}", weak.says);
-    }
-}
-
 /// Of a plan without revisits `assess` promises what `identify` then states, with the same noise: the probe's share and, with the
 /// scatter of indexing, the whole.
 #[test]
@@ -453,54 +235,18 @@ fn assess_promises_what_identify_states() {
 }
 
 /// A study with an effect of the user's own beside [`MODEL`].
-fn fit_with(machine: &Machine, runs: &[(Plan, Vec<Touch>)], own: &str, effects: &[&str]) -> axiscal::diag::Result<Fit> {
+pub(super) fn fit_with(
+    machine: &Machine,
+    runs: &[(Plan, Vec<Touch>)],
+    own: &str,
+    effects: &[&str],
+) -> axiscal::diag::Result<Fit> {
     let mut catalogue = Catalogue::built_in().unwrap();
     catalogue.add_file(&axiscal::diag::source("own.toml", own)).unwrap();
     let runs: Vec<Run> =
         runs.iter().map(|(plan, touches)| Run { plan, touches, mounting: None, started_s: None }).collect();
     let effects = MODEL.iter().chain(effects).map(|e| (*e).to_owned()).collect();
     axiscal::fit::identify(machine, &catalogue, &runs, &Settings { effects, ..Settings::default() })
-}
-
-/// Where another direction without a trace moves a sum, that sum is not said to be seen; where none does, it is.
-#[test]
-fn a_sum_that_another_direction_moves_is_not_said_to_be_seen() {
-    let machine = machine("swivel-head");
-    let runs = measured(&machine, 32);
-    let effect = |id: &str| {
-        format!(
-            "[[effect]]\nid = \"{id}\"\nname = \"Another place of C\"\nat = \"C\"\nterms = [{{ parameter = \"{id}\", unit = \"mm\", dof = \"dx\", formula = \"1\", typical = 0.016 }}]\n"
-        )
-    };
-    let one = fit_with(&machine, &runs, &effect("again"), &["again"]).unwrap().outcome;
-    assert!(
-        one.undetermined.len() == 1 && one.undetermined[0].says.starts_with("Only the sum"),
-        "{:?}",
-        one.undetermined
-    );
-    let two = fit_with(&machine, &runs, &(effect("again") + &effect("thrice")), &["again", "thrice"]).unwrap().outcome;
-    assert_eq!(two.undetermined.len(), 2);
-    for u in &two.undetermined {
-        assert!(!u.says.starts_with("Only") && u.says.contains("+1 mm of"), "{}", u.says);
-    }
-    // none of the three has a value, so no pair of them is told apart badly
-    for c in &two.correlations {
-        for name in [&c.a, &c.b] {
-            let p = two.parameters.iter().find(|p| &p.name == name).unwrap();
-            assert!(p.sigma.is_some(), "{c:?}");
-        }
-    }
-}
-
-/// Few touches: what is a gauge is said once, and not again as hardly told.
-#[test]
-fn a_gauge_is_not_hardly_told_too() {
-    let machine = machine("swivel-head");
-    let (plan, touches) = measured(&machine, 33).swap_remove(0);
-    let runs = [(plan, touches[..29].to_vec())];
-    let o = fit(&machine, &runs, &["location-b", "block-setup", "pretravel"], Settings::default()).outcome;
-    assert!(!o.undetermined.is_empty());
-    assert!(o.weak.iter().all(|w| w.times_typical < 1e9), "{:?}", o.weak);
 }
 
 /// A prior and a held value that the touches contradict are said with both numbers, and the model is not blamed for them; those
@@ -655,41 +401,4 @@ fn a_noise_that_no_touches_tell_is_not_taken_for_sure() {
         let o = said(program, touch_um);
         assert!(!may_be_the_probe(&o) && better(&o).is_none(), "{program} {touch_um}: {:?}", o.remarks);
     }
-}
-
-/// Few touches say little of what a standard deviation is: good ones stay, and a chip goes all the same.
-#[test]
-fn good_touches_of_a_short_plan_stay() {
-    let machine = machine("swivel-head");
-    let head = plan(&machine, "head");
-    for (n, effects) in [(8, &["pretravel"][..]), (12, &["pretravel"]), (28, &["block-setup", "pretravel"])] {
-        let short = Plan { touches: head.touches[..n].to_vec(), ..head.clone() };
-        let (mut thrown, mut found) = (0, 0);
-        for seed in 0..150 {
-            let touches = touch(&machine, &short, &Scenario::flawless().with_noise(1e-3, 0.0, 1000 + seed), None);
-            let mut run = (short.clone(), touches);
-            let rejected = |run: &(Plan, Vec<Touch>)| {
-                let settings = Settings { bare: true, ..Settings::default() };
-                fit(&machine, std::slice::from_ref(run), effects, settings).rejected.keys().copied().collect::<Vec<_>>()
-            };
-            thrown += usize::from(!rejected(&run).is_empty());
-            chip(&mut run, 2, 0.2);
-            found += usize::from(rejected(&run) == [2]);
-        }
-        assert!(thrown <= 1, "{n} touches: good ones thrown out in {thrown} of 150 runs");
-        assert!(found >= 140, "{n} touches: a chip found in {found} of 150 runs");
-    }
-}
-
-/// Beside touches without noise a wrong one is off by any number of their standard deviations.
-#[test]
-fn a_number_of_standard_deviations_has_few_digits() {
-    let machine = machine("swivel-head");
-    let head = plan(&machine, "head");
-    let touches = touch(&machine, &head, &Scenario::flawless(), None);
-    let mut run = (head, touches);
-    chip(&mut run, 100, 0.008);
-    let rejected = fit(&machine, &[run], &["location-b", "block-setup", "pretravel"], Settings::default()).rejected;
-    let reason = rejected.get(&100).unwrap().says();
-    assert!(reason.contains("more than 1000 standard deviations") || reason.contains("(80."), "{reason}");
 }
