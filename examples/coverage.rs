@@ -1,5 +1,6 @@
-//! Do errors scatter as their uncertainties say? Full count: `cargo run --release --example coverage [RUNS [VIRTUAL]]`,
-//! 5000 runs of each case by default, 500 of them measured by the virtual machine with its own noise. Prints every parameter
+//! Do errors scatter as their uncertainties say? Full count: `cargo run --release --example coverage [RUNS [VIRTUAL [NAME]]]`,
+//! 5000 runs of each case by default, 500 of them measured by the virtual machine with its own noise. NAME: only the cases whose
+//! machine or artefact has it in its name. Prints every parameter
 //! of each case, and at the end the table of docs/method.md.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // an example ends with what went wrong
 
@@ -9,13 +10,17 @@ mod common;
 mod coverage;
 
 fn main() {
-    let mut words = std::env::args().skip(1).map(|w| w.parse::<usize>().expect("a number of runs"));
-    let runs = words.next().unwrap_or(5000);
-    let n_virtual = words.next().unwrap_or(runs / 10);
+    let mut words = std::env::args().skip(1);
+    let mut count = || words.next().map(|w| w.parse::<usize>().expect("a number of runs"));
+    let runs = count().unwrap_or(5000);
+    let n_virtual = count().unwrap_or(runs / 10);
+    let name = words.next().unwrap_or_default();
+    let wanted =
+        |case: &&coverage::Case| [Some(case.machine), case.artefact].into_iter().flatten().any(|n| n.contains(&name));
     let mut wrong = Vec::new();
     let mut table = String::new();
     // the machines' own blocks, then every artefact on every machine
-    for case in coverage::CASES.iter().chain(&coverage::ARTEFACTS) {
+    for case in coverage::CASES.iter().chain(&coverage::ARTEFACTS).filter(wanted) {
         let begun = std::time::Instant::now();
         let summary = coverage::run(case, runs, n_virtual, 20);
         println!(

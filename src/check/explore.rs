@@ -7,6 +7,7 @@
 use super::doubt::{Doubt, Fork, Taken};
 use super::run::{Dialect, Event, Fault, Happened, Outcome, Pause, Probe, Run, Start, Trouble, Vm};
 use super::world::way_mm;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -171,17 +172,15 @@ pub fn explore_on<'p, D: Dialect>(
     run.keeps_forks = limits.is_some();
     run.doubts.keeps = limits.map(|_| Doubt::Stored);
     let mut forks = Vec::new();
-    let mut seen = Vec::new();
+    let mut leaving = Leaving { kept: Vec::new(), seen: Vec::new() };
     let mut probes = 0;
     loop {
-        let shared = told.branches.len();
         let part_before = run.vm.part;
         let paused = run.on();
         // events before the last stop belong to the part that was up then; a stop is at most the last of them
         note_parts(&mut told.parts, &run.vm, part_before);
-        for (trouble, fork) in run.take_forks() {
-            told.branches.extend(until_it_stops(fork, trouble.into()));
-        }
+        let troubled = run.take_forks().into_iter();
+        leaving.kept.extend(troubled.map(|(trouble, fork)| Leaves::Trouble(fork, trouble.into())));
         forks.extend(run.take_doubted());
         match paused {
             Err(fault) => {
@@ -200,9 +199,8 @@ pub fn explore_on<'p, D: Dialect>(
                 if let Some(limits) = limits.filter(|l| probes <= l.probes) {
                     let leaves = run.vm.trace.len();
                     let trace = std::mem::take(&mut run.vm.trace);
-                    for deviation in deviations(&run.vm, &probe, outcome, limits) {
-                        told.branches.extend(follow(run.clone(), &probe, outcome, deviation));
-                    }
+                    let ways = deviations(&run.vm, &probe, outcome, limits);
+                    leaving.kept.push(Leaves::Probe { run: run.clone(), probe: probe.clone(), outcome, ways });
                     if ABORTED_AT.contains(&probes)
                         && let Some(again) = restart(&run)
                     {
@@ -210,11 +208,14 @@ pub fn explore_on<'p, D: Dialect>(
                     }
                     run.vm.trace = trace;
                 }
-                share_settings(&mut seen, &mut told.branches[shared..]);
+                if leaving.kept.len() >= MOST_LEAVING {
+                    leaving.follow(&mut told.branches);
+                }
                 run.resolve(outcome);
             }
         }
     }
+    leaving.follow(&mut told.branches);
     told.settings[1] = run.dialect.settings();
     note_parts(&mut told.parts, &run.vm, run.vm.part);
     told.trunk = run.vm.trace;
@@ -222,12 +223,40 @@ pub fn explore_on<'p, D: Dialect>(
     Explored { told, forks, cut: run.doubts.cut, left: run.dialect }
 }
 
-/// Settings that are the same are kept once: a long program has a hundred thousand branches.
-fn share_settings(seen: &mut Vec<Arc<BTreeMap<String, String>>>, branches: &mut [Branch]) {
-    for branch in branches {
-        match seen.iter().find(|known| **known == branch.settings) {
-            Some(known) => branch.settings = known.clone(),
-            None => seen.push(branch.settings.clone()),
+/// Where branches leave the trunk.
+enum Leaves<'p, D> {
+    /// At a statement that has trouble.
+    Trouble(Run<'p, D>, Deviation),
+    /// At a probing move, in several ways.
+    Probe { run: Run<'p, D>, probe: Probe, outcome: Outcome, ways: Vec<Deviation> },
+}
+
+/// Places of the trunk that are kept in memory at once.
+const MOST_LEAVING: usize = 64;
+
+/// Branches that are not followed yet: they know nothing of each other, and all cores follow some.
+struct Leaving<'p, D> {
+    kept: Vec<Leaves<'p, D>>,
+    /// Settings at the end of branches. The same are kept once: a long program has a hundred thousand branches.
+    seen: Vec<Arc<BTreeMap<String, String>>>,
+}
+
+impl<D: Dialect> Leaving<'_, D> {
+    fn follow(&mut self, branches: &mut Vec<Branch>) {
+        let kept = std::mem::take(&mut self.kept);
+        let followed = kept.into_par_iter().flat_map_iter(|leaves| match leaves {
+            Leaves::Trouble(run, deviation) => until_it_stops(run, deviation),
+            Leaves::Probe { run, probe, outcome, ways } => {
+                ways.into_iter().flat_map(|way| follow(run.clone(), &probe, outcome, way)).collect()
+            }
+        });
+        let followed: Vec<Branch> = followed.collect();
+        for mut branch in followed {
+            match self.seen.iter().find(|known| **known == branch.settings) {
+                Some(known) => branch.settings = known.clone(),
+                None => self.seen.push(branch.settings.clone()),
+            }
+            branches.push(branch);
         }
     }
 }

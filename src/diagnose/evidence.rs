@@ -54,16 +54,27 @@ impl WhiteRows {
 
     pub(super) fn of_mm(&self, mut columns_mm: DMatrix<f64>) -> DMatrix<f64> {
         self.whitening.apply(&mut columns_mm);
-        if self.used.len() == columns_mm.nrows() && self.n_priors == 0 {
+        let (touches, columns) = columns_mm.shape();
+        let rows = self.used.len() + self.n_priors;
+        if rows == touches && self.n_priors == 0 {
             return columns_mm;
         }
-        let mut out = DMatrix::zeros(self.used.len() + self.n_priors, columns_mm.ncols());
-        for (mut to, from) in out.column_iter_mut().zip(columns_mm.column_iter()) {
-            for (value, &i) in to.iter_mut().zip(&self.used) {
-                *value = from[i];
+        // in place: the columns of a large study are as much memory as it can have twice
+        let mut numbers: Vec<f64> = columns_mm.data.into();
+        for column in 0..columns {
+            for (to, &touch) in self.used.iter().enumerate() {
+                numbers[column * self.used.len() + to] = numbers[column * touches + touch];
             }
         }
-        out
+        numbers.truncate(columns * self.used.len());
+        if self.n_priors > 0 {
+            numbers.resize(columns * rows, 0.0);
+            for column in (0..columns).rev() {
+                numbers.copy_within(column * self.used.len()..(column + 1) * self.used.len(), column * rows);
+                numbers[column * rows + self.used.len()..(column + 1) * rows].fill(0.0);
+            }
+        }
+        DMatrix::from_vec(rows, columns, numbers)
     }
 }
 

@@ -69,6 +69,9 @@ const MOST_ROWS_KEPT: usize = 4_000;
 /// Columns that are worked on at once.
 const CHUNK: usize = 64;
 
+/// Numbers in them: 16 MB. Larger pieces of memory are handed back to the system after each use, and cleared before the next.
+const CHUNK_NUMBERS: usize = 2_000_000;
+
 #[derive(Clone)]
 enum Columns {
     /// In memory, one after the other.
@@ -267,9 +270,17 @@ impl Library {
         let mut spans: Vec<&Range<usize>> =
             self.candidates.iter().flat_map(|c| &c.variants).map(|v| &v.columns).collect();
         spans.sort_by_key(|span| span.start);
+        let small = |columns: usize| columns * self.n_rows <= CHUNK_NUMBERS;
         for span in spans {
             match out.last_mut() {
-                Some(last) if last.end == span.start && last.len() < CHUNK && !ends(span.start) => last.end = span.end,
+                Some(last)
+                    if last.end == span.start
+                        && last.len() < CHUNK
+                        && small(last.len() + span.len())
+                        && !ends(span.start) =>
+                {
+                    last.end = span.end;
+                }
                 _ => out.push(span.clone()),
             }
         }
