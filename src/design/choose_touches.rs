@@ -309,26 +309,33 @@ impl Choice {
         factor.l_dirty().solve_lower_triangular_mut(&mut out).then_some(out)
     }
 
-    /// Information about the effects with this covariance of theirs.
-    fn of_covariance(effects: DMatrix<f64>) -> DMatrix<f64> {
-        let n = effects.nrows();
-        match effects.cholesky() {
-            Some(factor) => factor.inverse() - DMatrix::identity(n, n) * FAINT,
-            None => DMatrix::zeros(n, n),
-        }
+    /// Inverse of the effects' covariance.
+    fn inverse(&self, design: &Design) -> DMatrix<f64> {
+        let (p, q) = (design.n_base, self.covariance.ncols() - design.n_base);
+        let covariance = self.covariance.view((p, p), (q, q)).into_owned();
+        covariance.cholesky().map_or_else(|| Self::of_nothing(q), |factor| factor.inverse())
     }
 
+    /// Information about the effects.
     fn effects(&self, design: &Design) -> DMatrix<f64> {
-        let (p, q) = (design.n_base, self.covariance.ncols() - design.n_base);
-        Self::of_covariance(self.covariance.view((p, p), (q, q)).into_owned())
+        let inverse = self.inverse(design);
+        let q = inverse.nrows();
+        inverse - Self::of_nothing(q)
     }
 
-    /// The value with one bundle more (`sign` 1) or less (−1).
-    fn value(&self, design: &Design, bundle: usize, sign: f64, value: &Value) -> Option<f64> {
-        let (p, q) = (design.n_base, self.covariance.ncols() - design.n_base);
+    /// What is known of the effects before any touch.
+    fn of_nothing(q: usize) -> DMatrix<f64> {
+        DMatrix::identity(q, q) * FAINT
+    }
+
+    /// The value with one bundle more (`sign` 1) or less (−1). `inverse`: of the effects' covariance as it is; by Woodbury.
+    fn value(&self, design: &Design, inverse: &DMatrix<f64>, bundle: usize, sign: f64, value: &Value) -> Option<f64> {
+        let (p, q) = (design.n_base, inverse.nrows());
         let change = self.change(design, bundle, sign, p..p + q)?;
-        let covariance = self.covariance.view((p, p), (q, q)) - change.tr_mul(&change) * sign;
-        Some(value(&Self::of_covariance(covariance)))
+        let mut by = &change * inverse;
+        let left = DMatrix::identity(change.nrows(), change.nrows()) - &by * change.transpose() * sign;
+        left.cholesky()?.l_dirty().solve_lower_triangular_mut(&mut by).then_some(())?;
+        Some(value(&(inverse + by.tr_mul(&by) * sign - Self::of_nothing(q))))
     }
 
     /// One bundle more (`sign` 1) or less (−1).
@@ -347,10 +354,12 @@ impl Choice {
     /// Takes what is worth most for its time until nothing more fits, all `but` one.
     fn fill(&mut self, design: &Design, pool: &[Bundle], budget_s: f64, but: Option<usize>, value: &Value) {
         loop {
-            let (here, spent) = (value(&self.effects(design)), cost_s(pool, &self.chosen));
+            let inverse = self.inverse(design);
+            let here = value(&(&inverse - Self::of_nothing(inverse.nrows())));
+            let spent = cost_s(pool, &self.chosen);
             let gain = |i: usize| {
                 let seconds = cost_s(pool, &[&self.chosen[..], &[i]].concat());
-                let gain = (seconds <= budget_s).then(|| self.value(design, i, 1.0, value))?? - here;
+                let gain = (seconds <= budget_s).then(|| self.value(design, &inverse, i, 1.0, value))?? - here;
                 Some((gain / (seconds - spent), i)).filter(|g| g.0 > 1e-9)
             };
             let open = (0..pool.len()).into_par_iter().filter(|i| but != Some(*i) && !self.chosen.contains(i));
@@ -368,7 +377,8 @@ impl Choice {
         self.fill(design, pool, budget_s, None, &worth);
         for _ in 0..MOST_ROUNDS {
             let here = worth(&self.effects(design));
-            let without = |&i: &usize| Some((self.value(design, i, -1.0, &worth)?, i));
+            let inverse = self.inverse(design);
+            let without = |&i: &usize| Some((self.value(design, &inverse, i, -1.0, &worth)?, i));
             let mut least: Vec<(f64, usize)> = self.chosen.iter().filter_map(without).collect();
             least.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
             let tried = least.into_par_iter().take(MOST_OUT).map(|(_, out)| {
