@@ -1,7 +1,7 @@
 //! Do errors scatter as their uncertainties say? Full count: `cargo run --release --example coverage [RUNS [VIRTUAL [NAME]]]`,
 //! 5000 runs of each case by default, 500 of them measured by the virtual machine with its own noise. NAME: only the cases whose
-//! machine or artefact has it in its name. Prints every parameter
-//! of each case, and at the end the table of docs/method.md.
+//! machine or artefact has it in its name. Prints every parameter of each case, and at the end the
+//! table of docs/method.md.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // an example ends with what went wrong
 
 #[path = "../tests/common/mod.rs"]
