@@ -12,8 +12,11 @@ use crate::probability::chi2_quantile;
 use nalgebra::{DMatrix, DVector};
 use std::collections::HashMap;
 
-/// A pose visited this often at most enters the estimate of τ: the work grows with its cube.
+/// Rows of a pose that enter the estimate of τ at most: the work grows with their cube.
 const MOST_ROWS: usize = 600;
+
+/// Of a pose with more rows so many enter, those of its first visits: a study of a hundred thousand touches has enough of them.
+const ENOUGH_ROWS: usize = 240;
 
 /// How a fit followed what changes from visit to visit.
 pub struct Followed {
@@ -90,7 +93,16 @@ pub(super) fn revisits(samples: &[Sample], followed: Option<&Followed>) -> Revis
         let mut times: HashMap<usize, usize> = HashMap::new();
         rows.iter().for_each(|r| *times.entry(r.sample.point).or_default() += 1);
         rows.retain(|r| times[&r.sample.point] > 1);
-        if rows.len() < 2 || rows.len() > MOST_ROWS {
+        if rows.len() > MOST_ROWS {
+            let end = rows.chunk_by(|a, b| a.sample.visit == b.sample.visit).map(<[Row]>::len);
+            let ends = end.scan(0, |at, n| {
+                *at += n;
+                Some(*at)
+            });
+            let kept = ends.take_while(|&end| end <= ENOUGH_ROWS).last().unwrap_or(0);
+            rows.truncate(kept);
+        }
+        if rows.len() < 2 {
             continue;
         }
         let mut visits: Vec<usize> = rows.iter().map(|r| r.sample.visit).collect();
@@ -269,5 +281,32 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// A hundred visits of a pose say how far they scatter, by the first of them: too many are not none.
+    #[test]
+    fn many_visits_of_a_pose_count_by_the_first_of_them() {
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(6);
+        let mut samples = Vec::new();
+        for visit in 0..100 {
+            let moved = rng.random_range(-3.0..3.0);
+            for point in 0..10 {
+                let residual_mm = moved + rng.random_range(-0.1..0.1);
+                samples.push(Sample {
+                    residual_mm,
+                    normal: Vector3::x(),
+                    repeat: samples.len(),
+                    visit,
+                    pose: 0,
+                    point,
+                });
+            }
+        }
+        let (all, first) = (revisits(&samples, None), revisits(&samples[..240], None));
+        assert_eq!(all.contrasts.len(), 23);
+        assert_eq!(all.within, first.within);
+        // a uniform distribution over 6 has the variance 3, of which each contrast shows as much as there are points
+        let shown = all.contrasts.iter().map(|c| c.square / c.lambda).sum::<f64>() / 23.0;
+        assert!((1.5..4.5).contains(&shown), "{shown}");
     }
 }
