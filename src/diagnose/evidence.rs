@@ -59,7 +59,7 @@ impl WhiteRows {
         if rows == touches && self.n_priors == 0 {
             return columns_mm;
         }
-        // in place: the columns of a large study are as much memory as it can have twice
+        // in place: the columns of a large study would not fit into memory twice
         let mut numbers: Vec<f64> = columns_mm.data.into();
         for column in 0..columns {
             for (to, &touch) in self.used.iter().enumerate() {

@@ -15,7 +15,7 @@ use std::collections::HashMap;
 /// Rows of a pose that enter the estimate of τ at most: the work grows with their cube.
 const MOST_ROWS: usize = 600;
 
-/// Of a pose with more rows so many enter, those of its first visits: a study of a hundred thousand touches has enough of them.
+/// Where a pose has more rows than that, its first visits enter, with at most this many rows.
 const ENOUGH_ROWS: usize = 240;
 
 /// How a fit followed what changes from visit to visit.

@@ -380,8 +380,9 @@ def collect(args, run, own, machine):
     offsets = config.read_var(os.path.join(run, "rig.var"))
     seeded = parse_g54(args.g54) if args.g54 else {**{k: v for k, v in G54.items() if k in machine.letters}, "R": G54_ROTATION}
     # the interpreter reads ahead: that it saw M2 means an end there only if nothing stopped the machine before
-    ended = ((bool(answer.get("read_m2")) or read_to_percent(args.program, answer.get("last_line"), [os.path.join(args.out, log) for log in logs]))
-             and not answer.get("errors") and not answer.get("failure"))
+    logs_written = [os.path.join(args.out, log) for log in logs]
+    at_the_end = bool(answer.get("read_m2")) or read_to_percent(args.program, answer.get("last_line"), logs_written)
+    ended = at_the_end and not answer.get("errors") and not answer.get("failure")
     def count(pin): return int(pins[pin]) if pin in pins else None
     result = {
         "format": "axiscal-rig/1", "ok": ended, "machine": machine.name, "program": os.path.basename(args.program),
