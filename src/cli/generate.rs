@@ -133,6 +133,9 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if let Some(better) = auto.as_ref().and_then(|a| a.better.as_ref()) {
         io.report(&[crate::words::generate::badly_placed(better)]);
     }
+    if let Some(taken) = auto.as_ref().and_then(|a| a.taken.as_ref()) {
+        io.say(crate::words::generate::built_in_taken(taken));
+    }
     if auto.is_some() {
         io.say(format!(
             "{AUTO}.toml holds the chosen touches: to change them, edit a copy of it and use that with --program FILE"

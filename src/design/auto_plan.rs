@@ -29,7 +29,7 @@ pub struct Choice {
     pub chosen: Vec<usize>,
     /// Those of them that come once more at the end.
     pub again: Vec<usize>,
-    /// Standard uncertainty of the worst-determined result, in its typical size.
+    /// Standard uncertainty of the worst-determined result where nothing but the model acts, in its typical size.
     pub worst: f64,
 }
 
@@ -46,6 +46,7 @@ pub fn choose(view: &LinearisedPlan, pool: &[Bundle], budget_s: f64) -> Choice {
     let mut of_model = Covariance::new(rows.columns(0, n_base).into_owned(), |_| WIDE * WIDE);
     let worst = |c: &Covariance, r: &Range<usize>| c.worst_falls(r, &results);
     of_model.fill(pool, &visits, &mut chosen, FOR_RESULTS * budget_s, &worst);
+    let of_results = chosen.len();
 
     // an effect of the catalogue has its typical size
     let mut of_all = Covariance::new(rows, |c| if c < n_base { WIDE * WIDE } else { 1.0 });
@@ -60,7 +61,8 @@ pub fn choose(view: &LinearisedPlan, pool: &[Bundle], budget_s: f64) -> Choice {
             again.push(v);
         }
     }
-    let worst = results.iter().map(|&c| of_all.covariance[(c, c)].max(0.0).sqrt()).fold(0.0, f64::max);
+    chosen[of_results..].iter().for_each(|&i| of_model.take(&visits.rows[i]));
+    let worst = results.iter().map(|&c| of_model.covariance[(c, c)].max(0.0).sqrt()).fold(0.0, f64::max);
     Choice { chosen: visits.members(&chosen), again: visits.members(&again), worst }
 }
 

@@ -16,6 +16,7 @@ pub mod record;
 mod score;
 mod shape_parameters;
 pub mod vary;
+pub mod worth;
 
 pub use assess::{Request, assess};
 pub use explain::explain;

@@ -160,7 +160,7 @@ fn traceless(a: &Assessment, equal: &dyn Fn(&str) -> bool) -> String {
     format!("{} effects have no effect on the touches{but}", all.len())
 }
 
-fn is_location(effect: &str) -> bool {
+pub(super) fn is_location(effect: &str) -> bool {
     effect.starts_with("location-") || effect.starts_with("paper-") || effect == "double-head-10"
 }
 

@@ -33,6 +33,19 @@ pub fn built_in() -> Result<Vec<ProgramSpec>> {
         .collect()
 }
 
+/// The built-in programs that were written for a machine and touch nothing but one of its mountings: what they are, and their text.
+///
+/// # Errors
+/// Never for a released program: the files are tested.
+pub fn written_for(machine: &Machine, mounting: &str) -> Result<Vec<(ProgramSpec, &'static str)>> {
+    let texts = BUILT_IN.iter().map(|(_, text)| *text);
+    let touches_it = |s: &ProgramSpec| {
+        s.machine.as_ref().is_some_and(|m| m.value == machine.name)
+            && s.parts.iter().all(|part| part.mounting.value == mounting)
+    };
+    Ok(built_in()?.into_iter().zip(texts).filter(|(spec, _)| touches_it(spec)).collect())
+}
+
 /// Chooses the program of a name for a machine: the one that was written for it, else the only one that names no axis
 /// which the machine lacks and whose mounting and blocks it has.
 ///

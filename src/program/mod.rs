@@ -32,7 +32,7 @@ mod verify;
 #[cfg(test)]
 mod tests;
 
-pub use library::{built_in, choose};
+pub use library::{built_in, choose, written_for};
 pub use operator_notes::{SkippedGroup, duration, pose_says, skipped_groups};
 pub use plan_without_path::plan_without_path;
 pub use spec::{ProgramSpec, load};

@@ -2,7 +2,7 @@
 
 use crate::diag::Finding;
 use crate::units::Plain;
-use crate::workflow::auto_program::BetterPlace;
+use crate::workflow::auto_program::{BetterPlace, Taken};
 
 /// An artefact at a place where one of the machine's errors can hardly be measured.
 #[must_use]
@@ -26,4 +26,15 @@ pub fn badly_placed(better: &BetterPlace) -> Finding {
         by.join(" and "),
         better.times
     ))
+}
+
+/// A built-in program instead of touches that were chosen.
+#[must_use]
+pub fn built_in_taken(taken: &Taken) -> String {
+    let Taken { program, worth, of_choice } = taken;
+    format!(
+        "these are the touches of the built-in program {program}: its worst location error has a standard uncertainty of {:.2} of \
+         the usual size and it finds {} effects of their usual size; other touches in the same time: {:.2} and {}",
+        worth.worst, worth.found, of_choice.worst, of_choice.found
+    )
 }

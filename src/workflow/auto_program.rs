@@ -1,15 +1,18 @@
-//! A program that nobody has written: chosen for a machine and what is mounted on it, proven to be reachable.
+//! A program for a machine and what is mounted on it: chosen touch by touch and proven to be reachable, or a built-in one where that
+//! measures better in the same time.
 
 use super::new::default_effects;
 use crate::design::auto_plan::{Choice, choose};
 use crate::design::bundle::{
     Bundle, Head, SWIVELS_WIDE_DEG, VisitOf, as_plan, bundles, program_text, too_narrow, without,
 };
+use crate::design::worth::Worth;
 use crate::design::{LinearisedPlan, Noise, Planned, Task};
 use crate::diag::{Failure, Result, source};
 use crate::fit::effects_of;
 use crate::machine::{Machine, Mounting};
 use crate::model::catalogue::Catalogue;
+use crate::program::plan::Plan;
 use crate::program::{self, Generated, Options, ProgramSpec};
 use crate::units::mm_from_um;
 use nalgebra::Vector3;
@@ -41,6 +44,17 @@ pub struct AutoProgram {
     pub spec: ProgramSpec,
     /// A place at which the artefact would see much more.
     pub better: Option<BetterPlace>,
+    /// The built-in program that was taken.
+    pub taken: Option<Taken>,
+}
+
+/// A built-in program that measures better than the touches that would be chosen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Taken {
+    pub program: String,
+    pub worth: Worth,
+    /// Of the choice that was not taken.
+    pub of_choice: Worth,
 }
 
 /// Another place for an artefact.
@@ -82,11 +96,18 @@ pub fn auto_program(
     let mut best: Option<(f64, String)> = None;
     let mut worst = f64::INFINITY;
     let mut why: Option<Failure> = None;
+    // what the touches of the pool see, and how many these are: a pool only becomes smaller
+    let mut pool_seen: Option<(usize, LinearisedPlan)> = None;
     for _ in 0..MOST_ROUNDS {
         if pool.is_empty() {
             break;
         }
-        let choice = choose(&linearised(machine, catalogue, mounting, &pool, budget_s)?, &pool, budget_s * scale);
+        let touches: usize = pool.iter().map(|bundle| bundle.touches.len()).sum();
+        if pool_seen.as_ref().is_none_or(|(seen, _)| *seen != touches) {
+            pool_seen = Some((touches, linearised(machine, catalogue, mounting, &pool, budget_s)?));
+        }
+        let Some((_, view)) = &pool_seen else { break };
+        let choice = choose(view, &pool, budget_s * scale);
         if choice.chosen.is_empty() {
             break;
         }
@@ -139,8 +160,48 @@ pub fn auto_program(
     };
     let (_, text) = best.ok_or_else(nothing)?;
     let (spec, _) = program::load(&source("auto.toml", text.clone()))?;
+    if let (None, Some(written)) = (by_eye_mm, better_written(machine, catalogue, mounting, &spec, budget_s)?) {
+        return Ok(written);
+    }
     let better = if worst > POOR { better_place(machine, catalogue, mounting, budget_s, worst)? } else { None };
-    Ok(AutoProgram { text, spec, better })
+    Ok(AutoProgram { text, spec, better, taken: None })
+}
+
+/// The built-in program for this machine and mounting that a choice does not reach in the same time.
+fn better_written(
+    machine: &Machine,
+    catalogue: &Catalogue,
+    mounting: &Mounting,
+    choice: &ProgramSpec,
+    budget_s: f64,
+) -> Result<Option<AutoProgram>> {
+    let mut written = Vec::new();
+    for (spec, text) in program::written_for(machine, &mounting.name)? {
+        // a mounting that was changed may no longer suit it
+        let Ok((made, _)) = program::generate(machine, &spec, &Options::default()) else { continue };
+        if made.path.seconds <= USED[1] * budget_s {
+            written.push((Worth::of(&view_of(machine, catalogue, made.plan)?), spec.name, text));
+        }
+    }
+    let Some((worth, name, text)) = written.into_iter().min_by(|a, b| a.0.worst.total_cmp(&b.0.worst)) else {
+        return Ok(None);
+    };
+    let (chosen, _) = program::generate(machine, choice, &Options::default())?;
+    let of_choice = Worth::of(&view_of(machine, catalogue, chosen.plan)?);
+    if of_choice.is_as_good_as(&worth) {
+        return Ok(None);
+    }
+    let text = renamed(text, &name)?;
+    let (spec, _) = program::load(&source("auto.toml", text.clone()))?;
+    Ok(Some(AutoProgram { text, spec, better: None, taken: Some(Taken { program: name, worth, of_choice }) }))
+}
+
+/// The text of a built-in program as a file of its own.
+fn renamed(text: &str, name: &str) -> Result<String> {
+    let unusable = |e: toml_edit::TomlError| Failure::new("auto::built_in", e.message().to_owned());
+    let mut file: toml_edit::DocumentMut = text.parse().map_err(unusable)?;
+    file["name"] = toml_edit::value("auto");
+    Ok(format!("# taken by `axiscal generate --program auto`: the built-in program {name}\n{file}"))
 }
 
 /// Looks at the places round the axis of what bears an artefact, and higher up: with the touches alone, not proven.
@@ -201,8 +262,12 @@ fn linearised(
     pool: &[Bundle],
     budget_s: f64,
 ) -> Result<LinearisedPlan> {
-    let planned = as_plan(machine, mounting, pool, budget_s / 2.0, VisitOf::Manner);
-    let effects = default_effects(machine, &[&planned], false);
+    view_of(machine, catalogue, as_plan(machine, mounting, pool, budget_s / 2.0, VisitOf::Manner))
+}
+
+/// What a plan sees, the whole catalogue beside the model.
+fn view_of(machine: &Machine, catalogue: &Catalogue, plan: Plan) -> Result<LinearisedPlan> {
+    let effects = default_effects(machine, &[&plan], false);
     let task = Task {
         machine,
         catalogue,
@@ -215,5 +280,5 @@ fn linearised(
         sigma_mm: mm_from_um(machine.probe.repeatability_um),
         tau_mm: machine.rotary().map(|a| a.indexing_repeatability_mm.powi(2)).sum::<f64>().sqrt(),
     };
-    LinearisedPlan::new(&task, &[Planned::new(planned)], &[], noise)
+    LinearisedPlan::new(&task, &[Planned::new(plan)], &[], noise)
 }

@@ -137,3 +137,43 @@ fn a_hole_that_is_too_narrow_is_refused_with_its_numbers() {
         "{said}"
     );
 }
+
+/// Worst uncertainty of a location error in its usual size, and how many effects are found at their usual size.
+fn worth(at: &Path, machine: &str, plan: &str) -> (f64, usize) {
+    let (says, code) = json(at, &["assess", "--machine", machine, "--plan", plan]);
+    assert_eq!(code, 0);
+    let parameters = says["parameters"].as_array().unwrap().iter();
+    let location = parameters.filter(|p| p["effect"].as_str().unwrap().starts_with("location-"));
+    // usual sizes of effects.toml: 10 um and 0.001 deg
+    let usual = |unit: &str| if unit == "mm" { 0.01 } else { 0.001 };
+    let shares = location.map(|p| p["sigma_with_visits"].as_f64().unwrap() / usual(p["unit"].as_str().unwrap()));
+    let seen = says["effects"].as_array().unwrap().iter().filter(|e| e["noncentrality"].as_f64().unwrap() >= 25.0);
+    (shares.fold(0.0, f64::max), seen.count())
+}
+
+#[test]
+fn in_the_same_time_auto_is_as_good_as_the_built_in_programs() {
+    for (machine, program, mounting) in [
+        ("trunnion", "basic", "table"),
+        ("nutating-b", "basic", "table"),
+        ("swivel-table-b", "full", "full"),
+        ("trunnion-offset", "full", "full"),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        let generate = ["generate", "--machine", machine, "--controller", "heidenhain"];
+        ok(at, &[&generate[..], &["--program", program, "--out", "hand"]].concat());
+        let plan = format!("hand/{program}.plan.json");
+        let text: serde_json::Value = serde_json::from_slice(&std::fs::read(at.join(&plan)).unwrap()).unwrap();
+        let minutes = text["touches"].as_array().unwrap().last().unwrap()["time_s"].as_f64().unwrap() / 60.0;
+        let auto = ["--program", "auto", "--mounting", mounting, "--minutes", &minutes.to_string(), "--out", "job"];
+        ok(at, &[&generate[..], &auto].concat());
+        let (by_hand, chosen) = (worth(at, machine, &plan), worth(at, machine, "job/auto.plan.json"));
+        assert!(chosen.0 <= by_hand.0 * (1.0 + 1e-9) && chosen.1 >= by_hand.1, "{machine}: {chosen:?}, {by_hand:?}");
+        // it is a file that can be edited and used like any other
+        let again = ["--program", "job/auto.toml", "--out", "again"];
+        ok(at, &[&generate[..], &again].concat());
+        let read = |folder: &str| std::fs::read(at.join(folder).join("auto.h")).unwrap();
+        assert!(read("job") == read("again"), "{machine}: another program from auto.toml");
+    }
+}
