@@ -1,8 +1,9 @@
 //! Hidden effects at full count: `cargo run --release --example discovery [-- PART COUNT]`. The table stands in
 //! docs/discovery.md. Parts: planted (paper, full), clean (clean-paper,
 //! clean-paper-visits, clean-full, clean-full-visits), two, strange; all of them without an argument.
-//! Planted by the generator of tests/discovery on all machines: faults (faults-paper, faults-full, faults-weak), faultless
-//! (faultless-paper, faultless-full), mistakes; on one sphere: faults-sphere, faultless-sphere.
+//! Planted by the generator of tests/discovery on all machines: faults (faults-paper, faults-full, faults-weak, faults-two), faultless
+//! (faultless-paper, faultless-full; with one scatter in µm: faultless-paper-0.3), mistakes; on one sphere: faults-sphere,
+//! faultless-sphere.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a measurement that cannot be made shall stop
 #![allow(missing_docs)]
 
@@ -96,12 +97,14 @@ fn report_clean(name: &str, verdicts: &[Clean]) {
 fn report_strange(name: &str, seen: &[Seen]) {
     let of = |what: &dyn Fn(&Seen) -> bool| percent(seen.iter().filter(|s| what(s)).count(), seen.len());
     println!(
-        "in no catalogue, {name}: {} runs, adequate {}, bare name {}, right variable first {}, touches rejected {}",
+        "in no catalogue, {name}: {} runs, adequate {}, bare name {}, right variable first {}, touches rejected {}, \
+         adequate with two names that are not the cause {}",
         seen.len(),
         of(&|s| s.verdict == Verdict::Adequate),
         of(&|s| s.bare),
         of(&|s| s.right()),
-        of(&|s| s.rejected > 0)
+        of(&|s| s.rejected > 0),
+        of(&|s| s.adequate_after_two)
     );
     let sketched: Vec<f64> = seen.iter().filter_map(|s| s.sketched).collect();
     if !sketched.is_empty() {
@@ -169,9 +172,16 @@ fn of_the_generator(part: &str, count: &dyn Fn(usize) -> usize) {
         let weak = Conditions { noncentrality: Some(45.0), ..plain };
         report_faults("noncentrality 45, full", &judge::planted(&Machines::all(true), weak, count(200), 53));
     }
+    if wanted("faults-two") {
+        let pairs = judge::pairs(&Machines::all(true), count(200), 59);
+        for p in pairs.iter().filter(|p| !p.both) {
+            println!("  MISSED | {} | {} | {:?}", p.bench, p.what.join(" and "), p.steps);
+        }
+        println!("two faults, full: both named {}", judge::rate(pairs.iter().filter(|p| p.both).count(), pairs.len()));
+    }
     for (name, full, seed) in [("faultless-paper", false, 54), ("faultless-full", true, 55)] {
-        for visit_um in [0.0, 0.3, 0.7] {
-            if wanted(name) {
+        for (at, visit_um) in [("0", 0.0), ("0.3", 0.3), ("0.7", 0.7)] {
+            if wanted(name) || part == format!("{name}-{at}") {
                 let verdicts = judge::clean(&Machines::all(full), visit_um, count(2000), seed);
                 let adequate = verdicts.iter().filter(|v| v.1 == "adequate").count();
                 println!(

@@ -9,9 +9,11 @@ use crate::words::diagnose as words;
 pub(super) fn say(subject: Subject, candidates: &mut [Candidate]) {
     for candidate in candidates {
         let Some(effect) = subject.catalogue.get(&candidate.effect, subject.machine) else { continue };
-        let name = effect.arm.and_then(|arm| effect.parameters.get(arm.parameter)).map(|p| &p.name);
-        let arm = name.and_then(|name| candidate.parameters.iter().find(|p| p.name == *name));
-        if let Some(point) = arm.and_then(|arm| turning_point(subject.machine, effect, arm.value)) {
+        let value = |parameter: usize| {
+            let name = &effect.parameters.get(parameter)?.name;
+            candidate.parameters.iter().find(|p| p.name == *name).map(|p| p.value)
+        };
+        if let Some(point) = turning_point(subject.machine, effect, value) {
             candidate.says = words::turning(&candidate.says, &point);
         }
     }

@@ -12,7 +12,7 @@ use super::{Fit, contradictions, held_out, null_space, outliers, poorly_determin
 use crate::machine::Machine;
 use crate::model::catalogue::Effect;
 use crate::model::data::UnusableReason;
-use crate::model::lever_arm::turning_point;
+use crate::model::lever_arm::{Arm, turning_point};
 use crate::model::predict::Unknown;
 use crate::units::um_from_mm;
 use crate::words::fit as words;
@@ -141,12 +141,14 @@ pub(super) fn assemble_result(
 /// The points about which axes turn, as far as the touches show them.
 fn turns_about(fit: &Fit, machine: &Machine, effects: &[&Effect], status: &[Status]) -> Vec<TurnsAbout> {
     let one = |effect: &&Effect| {
-        let name = &effect.parameters.get(effect.arm?.parameter)?.name;
-        let i = fit.model.unknowns.iter().position(|u| u.effect == effect.id && u.name == *name)?;
-        let known = matches!(status[i], Status::Identified | Status::Fixed);
-        let point = turning_point(machine, effect, fit.theta[i]).filter(|_| known)?;
-        let says = words::turning_point(&point);
-        Some(TurnsAbout { effect: effect.id.clone(), parameter: name.clone(), says })
+        let value = |parameter: usize| {
+            let name = &effect.parameters.get(parameter)?.name;
+            let i = fit.model.unknowns.iter().position(|u| u.effect == effect.id && u.name == *name)?;
+            matches!(status[i], Status::Identified | Status::Fixed).then(|| fit.theta[i])
+        };
+        let (Arm::Distance { parameter, .. } | Arm::Displaced { turn: (parameter, _), .. }) = effect.arm?;
+        let says = words::turning_point(&turning_point(machine, effect, value)?);
+        Some(TurnsAbout { effect: effect.id.clone(), parameter: effect.parameters.get(parameter)?.name.clone(), says })
     };
     effects.iter().filter_map(one).collect()
 }

@@ -242,7 +242,7 @@ pub struct Parameter {
 pub struct TurnsAbout {
     /// Id of the effect.
     pub effect: String,
-    /// Name of the parameter that says how far it is.
+    /// Name of the parameter that says how far it is, or how much it turns.
     pub parameter: String,
     pub says: String,
 }

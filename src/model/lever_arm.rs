@@ -44,20 +44,30 @@ pub(super) fn with_arm(mut row: EffectAsWritten) -> EffectAsWritten {
     row
 }
 
-/// The distance at which the turns of an effect act.
+/// What says about which point an effect turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Arm {
-    /// Which of the effect's parameters it is.
-    pub parameter: usize,
-    /// 0, 1, 2: along x, y, z.
-    pub along: usize,
+pub enum Arm {
+    /// A parameter of the shape: so far along x, y or z (0, 1, 2).
+    Distance { parameter: usize, along: usize },
+    /// One turn about x, y or z with a displacement along each of the other two, all in proportion to the same: parameters of the
+    /// turn and of the displacements, with their directions.
+    Displaced { turn: (usize, usize), shifts: [(usize, usize); 2] },
 }
 
 /// The arm of a row whose parameters have these names.
 pub(super) fn arm_of(row: &EffectAsWritten, names: &[String]) -> Option<Arm> {
-    let along = row.arm.as_ref().and_then(|word| component(word.get_ref()))?;
-    let name = arm_name(row.id.get_ref());
-    Some(Arm { parameter: names.iter().position(|n| *n == name)?, along })
+    let place = |name: &str| names.iter().position(|n| n == name);
+    if let Some(along) = row.arm.as_ref().and_then(|word| component(word.get_ref())) {
+        return Some(Arm::Distance { parameter: place(&arm_name(row.id.get_ref()))?, along });
+    }
+    let [first, second, third] = row.terms.as_slice() else { return None };
+    let dof = |term: &TermAsWritten, kind: char| component(term.dof.get_ref().strip_prefix(kind)?);
+    let parameter = |term: &TermAsWritten| place(term.parameter.get_ref());
+    let turn = (parameter(first)?, dof(first, 'r')?);
+    let shifts = [(parameter(second)?, dof(second, 'd')?), (parameter(third)?, dof(third, 'd')?)];
+    let alike = [second, third].iter().all(|term| term.formula.get_ref() == first.formula.get_ref());
+    let across = turn.1 != shifts[0].1 && turn.1 != shifts[1].1 && shifts[0].1 != shifts[1].1;
+    (alike && across).then_some(Arm::Displaced { turn, shifts })
 }
 
 fn arm_name(id: &str) -> String {
@@ -65,14 +75,12 @@ fn arm_name(id: &str) -> String {
 }
 
 /// About which point an axis turns where it should not turn.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct TurningPoint {
     /// The axis that turns.
     pub axis: AxisName,
-    /// 0, 1, 2: the point lies along x, y, z from there.
-    pub along: usize,
-    /// So far, mm.
-    pub mm: f64,
+    /// How far the point lies along x, y, z (0, 1, 2) from there, mm: one direction or two.
+    pub off_mm: Vec<(usize, f64)>,
     /// From where.
     pub from: From,
 }
@@ -86,24 +94,41 @@ pub enum From {
     Pivot,
 }
 
-/// Where the point lies about which an effect turns its axis, for a value of its arm, mm.
+/// Where the point lies about which an effect turns its axis; `value`: of each of its parameters, by its place, in its unit. None
+/// where the effect has no such point, or hardly turns.
 #[must_use]
-pub fn turning_point(machine: &Machine, effect: &Effect, arm_mm: f64) -> Option<TurningPoint> {
-    let arm = effect.arm?;
+pub fn turning_point(machine: &Machine, effect: &Effect, value: impl Fn(usize) -> Option<f64>) -> Option<TurningPoint> {
     let (Place::Before(name) | Place::After(name)) = effect.terms.first()?.place else { return None };
     let axis = machine.axis(name)?;
     let ball = machine.reference.ball;
     let (stated, from) = match (name.is_rotary(), axis.side) {
-        (true, Side::Tool) => {
-            return Some(TurningPoint { axis: name, along: arm.along, mm: arm_mm, from: From::Pivot });
-        }
+        (true, Side::Tool) => (ball, From::Pivot),
         (true, Side::Workpiece) => (own_point(machine, axis), From::Ball),
         (false, Side::Workpiece) => (ball, From::Ball),
         // a head's carriage: its own coordinates begin at the origin of R
         (false, Side::Tool) => (Vector3::zeros(), From::Ball),
     };
-    let mm = stated[arm.along] - ball[arm.along] + arm_mm;
-    Some(TurningPoint { axis: name, along: arm.along, mm, from })
+    let off = |along: usize, mm: f64| (along, stated[along] - ball[along] + mm);
+    let off_mm = match effect.arm? {
+        Arm::Distance { parameter, along } => vec![off(along, value(parameter)?)],
+        Arm::Displaced { turn, shifts } => {
+            // a turn θω̂ and a displacement t leave the point ω̂ × t/θ where it is; µm over µrad are metres
+            let factor = |parameter: usize| Some(value(parameter)? * effect.parameters.get(parameter)?.factor);
+            let theta = factor(turn.0)?;
+            let mut t = Vector3::zeros();
+            for (parameter, along) in shifts {
+                t[along] = factor(parameter)?;
+            }
+            let mut about = Vector3::zeros();
+            about[turn.1] = 1.0;
+            let point = about.cross(&t) / theta;
+            if !point.norm().is_finite() || point.norm() > 2.0 * FARTHEST_MM {
+                return None;
+            }
+            shifts.iter().map(|&(_, along)| off(along, point[along])).collect()
+        }
+    };
+    Some(TurningPoint { axis: name, off_mm, from })
 }
 
 fn component(letter: &str) -> Option<usize> {
@@ -131,17 +156,41 @@ mod tests {
         let catalogue = Catalogue::built_in().unwrap();
         let at = |machine: &str, id: &str, arm_mm: f64| {
             let machine = crate::machine::built_in(machine).unwrap().unwrap();
-            turning_point(&machine, catalogue.get(id, &machine).unwrap(), arm_mm)
+            let effect = catalogue.get(id, &machine).unwrap();
+            let is_arm = |i: usize| effect.parameters[i].name.starts_with("arm_");
+            turning_point(&machine, effect, |i| Some(if is_arm(i) { arm_mm } else { 0.0 }))
         };
         // C of the table: its arm counts from the height of the ball
-        let below = TurningPoint { axis: AxisName::C, along: 2, mm: -180.0, from: From::Ball };
+        let below = TurningPoint { axis: AxisName::C, off_mm: vec![(2, -180.0)], from: From::Ball };
         assert_eq!(at("swivel-head", "tilt-c-1", -180.0), Some(below));
-        let aside = TurningPoint { axis: AxisName::B, along: 1, mm: 90.0, from: From::Pivot };
+        let aside = TurningPoint { axis: AxisName::B, off_mm: vec![(1, 90.0)], from: From::Pivot };
         assert_eq!(at("swivel-head", "tilt-b-2", 90.0), Some(aside));
         // X carries the spindle: its arm counts from R, and the ball is 202.684 mm below that
         let above = at("trunnion", "carriage-sag-x", 0.0).unwrap();
-        assert!((above.mm - 202.684).abs() < 1e-12 && above.from == From::Ball, "{above:?}");
+        assert!((above.off_mm[0].1 - 202.684).abs() < 1e-12 && above.from == From::Ball, "{above:?}");
         assert_eq!(at("trunnion", "zero-a", 0.0), None);
+    }
+
+    #[test]
+    fn displacements_beside_a_turn_say_where_its_point_lies() {
+        use super::turning_point;
+        let catalogue = Catalogue::built_in().unwrap();
+        let machine = crate::machine::built_in("trunnion").unwrap().unwrap();
+        // Y bears the table. 50 urad about z through a point 300 mm from the ball to Y-, 100 mm to X+: what stands at the ball goes
+        // by 50 urad times 300 mm to -x and by 50 urad times 100 mm to -y
+        let effect = catalogue.get("angular-cy", &machine).unwrap();
+        let value = |x: f64, y: f64, turn: f64| {
+            move |i: usize| match effect.parameters[i].name.as_str() {
+                "ECY" => Some(turn),
+                "ECY_x" => Some(x),
+                _ => Some(y),
+            }
+        };
+        let point = turning_point(&machine, effect, value(-15.0, -5.0, 50.0)).unwrap();
+        let [(0, x), (1, y)] = point.off_mm[..] else { panic!("{point:?}") };
+        assert!((x - 100.0).abs() < 1e-9 && (y + 300.0).abs() < 1e-9, "{point:?}");
+        // a scale is no turn
+        assert_eq!(turning_point(&machine, effect, value(0.0, 5.0, 1.0)), None);
     }
 
     #[test]
@@ -156,7 +205,7 @@ mod tests {
         assert_eq!(names, ["lean", "arm_my_lean"]);
         let shift = &effect.terms[1];
         assert_eq!((shift.component, shift.formula.text()), (0, "-arm_my_lean*(X/300)"));
-        assert_eq!(effect.arm, Some(super::Arm { parameter: 1, along: 2 }));
+        assert_eq!(effect.arm, Some(super::Arm::Distance { parameter: 1, along: 2 }));
         let wrong = Catalogue::default().add_file(&source("my.toml", text.replace("\"z\"", "\"q\""))).unwrap_err();
         assert_eq!(wrong.0[0].code, "effects::arm");
     }

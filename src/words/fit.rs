@@ -36,14 +36,17 @@ pub(crate) fn reason(reason: &Reason) -> String {
 pub(crate) fn turning_point(point: &TurningPoint) -> String {
     const NEAR_MM: f64 = 20.0;
     let from = if point.from == From::Ball { "ball" } else { "pivot" };
-    let mm = point.mm.abs();
-    let place = match (point.along, point.mm > 0.0) {
-        _ if mm < NEAR_MM => format!("near the {from}"),
-        (2, true) => format!("{mm:.0} mm above the {from}"),
-        (2, false) => format!("{mm:.0} mm below the {from}"),
-        (along, up) => {
-            let letter = ["X", "Y"][along.min(1)];
-            format!("{mm:.0} mm from the {from} to {}{letter}", if up { "+" } else { "-" })
+    let letter = |along: usize| ["X", "Y", "Z"][along.min(2)];
+    let far: Vec<(usize, f64)> = point.off_mm.iter().copied().filter(|(_, mm)| mm.abs() >= NEAR_MM).collect();
+    let place = match far[..] {
+        [] => format!("near the {from}"),
+        [(2, mm)] => format!("{:.0} mm {} the {from}", mm.abs(), if mm > 0.0 { "above" } else { "below" }),
+        [(along, mm)] => {
+            format!("{:.0} mm from the {from} to {}{}", mm.abs(), letter(along), if mm > 0.0 { "+" } else { "-" })
+        }
+        _ => {
+            let each: Vec<String> = far.iter().map(|&(along, mm)| format!("{} {mm:+.0} mm", letter(along))).collect();
+            format!("at {} from the {from}", each.join(", "))
         }
     };
     if point.axis.is_rotary() {

@@ -81,8 +81,8 @@ fn gaps(bench: &Bench, acts: &[&Act]) -> (DVector<f64>, Fit) {
     (fit.with_touches(0.0, |t| DVector::from_vec(t.gaps(&free))) * 1000.0, fit)
 }
 
-/// The size of a fault, and its noncentrality at 1 µm of noise; `None` where the base model takes all of it.
-pub fn sized(bench: &Bench, base: &Act, fault: &Fault, conditions: Conditions, peak_um: f64) -> Option<(f64, f64)> {
+/// What a fault of size 1 adds to the readings, µm, and what of it the base model cannot follow.
+fn trace(bench: &Bench, base: &Act, fault: &Fault) -> Option<(DVector<f64>, DVector<f64>)> {
     let (without, fit) = gaps(bench, &[base]);
     let (with, _) = gaps(bench, &[base, &*fault.at_size(1.0)]);
     if with.len() != without.len() {
@@ -91,13 +91,96 @@ pub fn sized(bench: &Bench, base: &Act, fault: &Fault, conditions: Conditions, p
     let difference = with - without;
     let jacobian = fit.linear(0.0).jacobian;
     let touches = axiscal::search::Basis::new(&jacobian.rows(0, difference.len()).into_owned());
-    let seen = touches.project(&difference).norm_squared();
+    let left = touches.project(&difference);
+    Some((difference, left))
+}
+
+/// The size of a fault, and its noncentrality at 1 µm of noise; `None` where the base model takes all of it.
+pub fn sized(bench: &Bench, base: &Act, fault: &Fault, conditions: Conditions, peak_um: f64) -> Option<(f64, f64)> {
+    let (difference, left) = trace(bench, base, fault)?;
+    size_of(&difference, left.norm_squared(), conditions, peak_um)
+}
+
+fn size_of(difference: &DVector<f64>, seen: f64, conditions: Conditions, peak_um: f64) -> Option<(f64, f64)> {
     let size = match conditions.noncentrality {
         Some(wanted) => (wanted / seen).sqrt(),
         None => peak_um / difference.amax(),
     };
     // what must be made huge to be seen is no fault of a machine
     (size.is_finite() && size < 40.0 && size * size * seen >= 25.0).then_some((size, size * size * seen))
+}
+
+/// What came of two faults at once.
+#[derive(Debug, Clone)]
+pub struct Pair {
+    pub bench: String,
+    pub what: [String; 2],
+    /// The group of each step.
+    pub steps: Vec<Vec<String>>,
+    /// Each of the two has a right name in the group of a step of its own.
+    pub both: bool,
+}
+
+/// Two faults at once, each of which can be seen, until there are `count`: look, add what is proposed first, look again.
+pub fn pairs(benches: &[Bench], count: usize, seed: u64) -> Vec<Pair> {
+    let mut out = Vec::new();
+    let mut drawn = 0u64;
+    while out.len() < count {
+        let batch = 4 * rayon::current_num_threads() as u64;
+        let more: Vec<Option<Pair>> = (drawn..drawn + batch)
+            .into_par_iter()
+            .map(|i| {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(i));
+                pair(&benches[i as usize % benches.len()], &mut rng)
+            })
+            .collect();
+        out.extend(more.into_iter().flatten());
+        drawn += batch;
+    }
+    out.truncate(count);
+    out
+}
+
+/// Names that a step may have: a pair that hides each other is one question and does not count.
+const ONE_QUESTION: f64 = 0.95;
+const MOST_STEPS: usize = 4;
+
+fn pair(bench: &Bench, rng: &mut ChaCha8Rng) -> Option<Pair> {
+    let plain = Conditions { visit_um: 0.0, noncentrality: None };
+    let base = bench.ordinary(rng);
+    let mut acts: Vec<Box<Act>> = Vec::new();
+    let mut faults: Vec<Fault> = Vec::new();
+    let mut traces: Vec<DVector<f64>> = Vec::new();
+    while faults.len() < 2 {
+        let fault = super::faults::draw(bench, rng);
+        let peak_um = rng.random_range(3.0..10.0);
+        if faults.iter().any(|f| f.expects.iter().any(|id| fault.expects.contains(id))) {
+            continue;
+        }
+        let Some((difference, left)) = trace(bench, &base, &fault) else { continue };
+        let Some((size, _)) = size_of(&difference, left.norm_squared(), plain, peak_um) else { continue };
+        acts.push(fault.at_size(size));
+        traces.push(left.normalize());
+        faults.push(fault);
+    }
+    if traces[0].dot(&traces[1]).abs() >= ONE_QUESTION {
+        return None;
+    }
+    let all: Vec<&Act> = std::iter::once(&*base).chain(acts.iter().map(|act| &**act)).collect();
+    let touches = bench.measure(&all, 1.0, 0.0, true, rng);
+    let (mut more, mut steps) = (Vec::new(), Vec::new());
+    while steps.len() < MOST_STEPS {
+        let (now, settings) = fit(bench, &touches, &more);
+        let d = ask(bench, &now, &settings);
+        let Some(group) = groups(&d).into_iter().next().filter(|_| d.candidates[0].proposed) else { break };
+        more.push(group[0].clone());
+        steps.push(group);
+    }
+    let named = |step: &Vec<String>, fault: &Fault| step.iter().any(|id| fault.expects.contains(id));
+    let both = (0..steps.len())
+        .any(|i| (0..steps.len()).any(|j| i != j && named(&steps[i], &faults[0]) && named(&steps[j], &faults[1])));
+    let what = [faults[0].what.clone(), faults[1].what.clone()];
+    Some(Pair { bench: bench.name.clone(), what, steps, both })
 }
 
 /// Cases until `count` of them can be seen.

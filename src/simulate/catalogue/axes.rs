@@ -118,11 +118,7 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
         }
         ("angular", pair) => {
             let (dof, axis) = pair_in(pair, machine)?;
-            if dof < 3 {
-                Err(Refusal::Unknown)
-            } else {
-                Ok(vec![at_the_ball(polynomial(axis, dof, 1, false), machine)])
-            }
+            if dof < 3 { Err(Refusal::Unknown) } else { Ok(carriage_turn(axis, dof, machine)) }
         }
         _ => Err(Refusal::Unknown),
     }
@@ -229,6 +225,16 @@ fn carriage_sag(
         acts.push((moved(axis, 2), Shape::Power(axis, SPAN_MM, 2), -1.0));
     }
     Ok(both)
+}
+
+/// A carriage that turns in proportion to its way, about any point: besides the turn, what it bears goes across it.
+fn carriage_turn(axis: AxisName, dof: usize, machine: &Machine) -> Vec<Parameter> {
+    let turn = at_the_ball(polynomial(axis, dof, 1, false), machine);
+    let across = (0..3).filter(|to| to + 3 != dof).map(|to| {
+        let name = format!("E{}{axis}_{}", dof_letter(dof), ["x", "y", "z"][to]);
+        Parameter::at(name, Um, moved(axis, to), Shape::Power(axis, SPAN_MM, 1))
+    });
+    std::iter::once(turn).chain(across).collect()
 }
 
 fn moved(axis: AxisName, dof: usize) -> Target {

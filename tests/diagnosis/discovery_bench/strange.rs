@@ -38,6 +38,8 @@ pub struct Seen {
     pub bare: bool,
     /// Reduced RMS with the sketched formula, where the kind has one.
     pub sketched: Option<f64>,
+    /// With the first two names in the model, none of which is the cause: is nothing missing any more?
+    pub adequate_after_two: bool,
 }
 
 impl Seen {
@@ -60,12 +62,21 @@ fn one(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> Seen {
         }
     };
     let data = find::data(&bench.machine, &bench.plans, &touches);
-    let (fit, settings) = find::fit(&bench.machine, &catalogue, data, &[], None);
+    let (fit, settings) = find::fit(&bench.machine, &catalogue, data.clone(), &[], None);
     let options = Options { at_most: 3, refit: false, power: false, planned: None };
     let d = find::look(&bench.machine, &catalogue, &fit, &settings, &options);
+    let mut more: Vec<String> = Vec::new();
+    let mut last = d.clone();
+    for _ in 0..2 {
+        let Some(next) = last.candidates.iter().find(|c| !more.contains(&c.effect)) else { break };
+        more.push(next.effect.clone());
+        let (fit, settings) = find::fit(&bench.machine, &catalogue, data.clone(), &more, None);
+        last = find::look(&bench.machine, &catalogue, &fit, &settings, &options);
+    }
     Seen {
         kind,
         lambda,
+        adequate_after_two: last.verdict == Verdict::Adequate,
         verdict: d.verdict.clone(),
         first: d.depends.first().map(|w| format!("{} ({:.2})", w.id, w.share)),
         depends: d.depends.iter().map(|w| w.by.clone()).collect(),
