@@ -1,7 +1,7 @@
 //! Do errors scatter as their uncertainties say? Full count: `cargo run --release --example coverage [RUNS [VIRTUAL [NAME]]]`,
 //! 5000 runs of each case by default, 500 of them measured by the virtual machine with its own noise. NAME: only the cases whose
-//! machine or artefact has it in its name. Prints every parameter of each case, and at the end the
-//! table of docs/method.md.
+//! machine or artefact has it in its name; `scatter`: those with a scatter of index positions that is not as declared. Prints every
+//! parameter of each case, and at the end the table of docs/method.md.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // an example ends with what went wrong
 
 #[path = "../tests/common/mod.rs"]
@@ -20,7 +20,12 @@ fn main() {
     let mut wrong = Vec::new();
     let mut table = String::new();
     // the machines' own blocks, then every artefact on every machine
-    for case in coverage::CASES.iter().chain(&coverage::ARTEFACTS).filter(wanted) {
+    let mut cases: Vec<coverage::Case> =
+        coverage::CASES.iter().chain(&coverage::ARTEFACTS).filter(wanted).cloned().collect();
+    if name == "scatter" {
+        cases = coverage::scatters();
+    }
+    for case in &cases {
         let begun = std::time::Instant::now();
         let summary = coverage::run(case, runs, n_virtual, 20);
         println!(
@@ -78,9 +83,13 @@ fn line(case: &coverage::Case, summary: &coverage::Summary, results: &[&coverage
         format!("{tau_um:.2}").trim_end_matches('0').to_owned()
     };
     // a scatter that neither the study states nor the plan can tell is the declared one
-    let declared = case.tau_mm > 0.0 && case.stated_tau_mm.is_none() && !summary.tau_estimated;
+    let declared =
+        case.tau_mm > 0.0 && case.stated_tau_mm.is_none() && case.declared_tau_mm.is_none() && !summary.tau_estimated;
+    let declares = case
+        .declared_tau_mm
+        .map_or_else(String::new, |mm| format!(", {:.1} µm declared", axiscal::units::um_from_mm(mm)));
     format!(
-        "| {} {}{}, {tau} µm{}{} | {:.3} | {:.3} … {:.3} over {} results | {:.1} … {:.1} % |\n",
+        "| {} {}{}, {tau} µm{}{declares}{} | {:.3} | {:.3} … {:.3} over {} results | {:.1} … {:.1} % |\n",
         case.machine,
         case.programs.join(" + "),
         case.artefact.map_or_else(String::new, |a| format!(" with {a}")),

@@ -7,6 +7,7 @@
 use super::candidate_effects::Named;
 use super::evidence::Evidence;
 use super::features;
+use crate::fit::residual_scatter::{MOST_TIMES, known_beforehand};
 use crate::fit::{Fit, VisitSource, declared_tau_mm};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
@@ -20,16 +21,8 @@ use std::sync::Arc;
 /// Most effects or patterns that are supposed to be there at once.
 const MOST_AT_ONCE: usize = 4;
 
-/// The scatter is looked for up to so many times the declared one: more is no scatter of an axis.
-const MOST_TIMES: f64 = 3.0;
-
 /// Supposed scatters, in units of the largest.
 const SUPPOSED: [f64; 6] = [0.0, 0.12, 0.25, 0.42, 0.65, 1.0];
-
-/// What is known of the scatter before a measurement, as a part of −2 ln L: a declared value is uncertain by 0.7 of itself.
-fn known_beforehand(tau_mm: f64, declared_mm: f64) -> f64 {
-    2.0 * (tau_mm / declared_mm - 1.0).powi(2)
-}
 
 /// The regression of a fit and the candidates.
 pub(super) struct Regression<'c> {

@@ -204,7 +204,12 @@ impl<'a> Evidence<'a> {
 
     /// Variance from noise and priors.
     fn variance(&self, c: usize) -> f64 {
-        self.fit.covariance[(self.fit.free[c], self.fit.free[c])]
+        let as_weighted = self.fit.covariance[(self.fit.free[c], self.fit.free[c])];
+        // of visits that scatter less or more than the weights suppose
+        let noise = &self.fit.noise;
+        let shown = noise.visits_shown.map(|shown| shown.tau_mm).filter(|tau| *tau > 0.0);
+        let more = shown.map_or(0.0, |tau| 1.0 - (noise.tau_mm / tau).powi(2));
+        as_weighted + more * self.by_visits[c]
     }
 
     /// What of it the priors make.

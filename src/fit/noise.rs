@@ -5,6 +5,7 @@
 
 use super::quantiles;
 use super::remark::{NoiseSource, Remark, VisitSource};
+use super::residual_scatter::Shown;
 use super::revisits::{Followed, Revisits, revisits};
 use super::rounding::Rounding;
 use crate::probability::{chi2_cdf, chi2_quantile};
@@ -34,9 +35,11 @@ pub struct Noise {
     pub source: NoiseSource,
     /// Degrees of freedom of σ; none where it is taken as known.
     pub dof: Option<f64>,
-    /// Standard deviation of each component of a visit's displacement, mm: what weights and uncertainties use, from
-    /// whatever source.
+    /// Standard deviation of each component of a visit's displacement, mm: what weights use, and uncertainties unless
+    /// `visits_shown` says more.
     pub tau_mm: f64,
+    /// What the residuals show of it, where only a declared one is known: what uncertainties use.
+    pub visits_shown: Option<Shown>,
     /// Where it comes from.
     pub visit_source: VisitSource,
     /// Degrees of freedom of τ; none where it is taken as known.
@@ -161,6 +164,7 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         source,
         dof: sigma_dof,
         tau_mm,
+        visits_shown: None,
         visit_source,
         visit_dof,
         tau_test_mm,
@@ -302,7 +306,8 @@ impl Noise {
     #[must_use]
     pub fn coverage(&self, visit_share: f64) -> f64 {
         let part = |share: f64, dof: Option<f64>| dof.map_or(0.0, |d| share * share / d.max(1.0));
-        let sum = part(1.0 - visit_share, self.dof) + part(visit_share, self.visit_dof);
+        let sum = part(1.0 - visit_share, self.dof)
+            + part(visit_share, self.visit_dof.or(self.visits_shown.map(|shown| shown.dof)));
         coverage((sum > 1e-9).then(|| 1.0 / sum))
     }
 }

@@ -10,7 +10,7 @@ use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::model::data::Data;
 use crate::model::predict::{Model, Observation, Unknown};
-use nalgebra::{DMatrix, DMatrixViewMut, DVector, Matrix3};
+use nalgebra::{DMatrix, DMatrixViewMut, DVector, Matrix3, MatrixXx3};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -20,12 +20,32 @@ pub(super) const MOST_UNMODELLED: usize = 20_000;
 /// Touches whose columns of the whole catalogue are held at once.
 const UNMODELLED_AT_ONCE: usize = 128;
 
-/// Variance of each free unknown that goes back to the scatter of visits.
+/// Variance of each free unknown that goes back to the scatter of visits as the residuals show it.
 pub(super) fn visit_variance(fit: &Fit) -> DVector<f64> {
-    let tau = fit.noise.tau_mm;
     let mut out = DVector::zeros(fit.free.len());
+    let tau = fit.noise.visits_shown.map_or(fit.noise.tau_mm, |shown| shown.tau_mm);
+    each_visit(fit, |moves| {
+        for (i, row) in moves.row_iter().enumerate() {
+            out[i] += tau * tau * row.norm_squared();
+        }
+    });
+    out
+}
+
+/// What the covariance of the free unknowns lacks where visits scatter more than the weights suppose (less: it is negative).
+fn visit_excess(fit: &Fit) -> Option<DMatrix<f64>> {
+    let shown = fit.noise.visits_shown?.tau_mm;
+    let more = shown * shown - fit.noise.tau_mm * fit.noise.tau_mm;
+    let mut out = DMatrix::zeros(fit.free.len(), fit.free.len());
+    each_visit(fit, |moves| out.gemm(more, moves, &moves.transpose(), 1.0));
+    Some(out)
+}
+
+/// How the displacement of each visit, along x, y, z, moves the free unknowns: their units per mm.
+fn each_visit(fit: &Fit, mut of: impl FnMut(&MatrixXx3<f64>)) {
+    let tau = fit.noise.tau_mm;
     if tau == 0.0 {
-        return out;
+        return;
     }
     let c = free_covariance(fit);
     let theta = fit.free_theta();
@@ -42,16 +62,12 @@ pub(super) fn visit_variance(fit: &Fit) -> DVector<f64> {
                     let row = jacobian.row(i - part.start).transpose();
                     sums.ger(fit.weight[i], &touches.normal_in_r(i), &row, 1.0);
                 }
-                // JᵀV⁻¹N of this visit, times C: how its displacement moves each unknown
+                // JᵀV⁻¹N of this visit, times C
                 let by = (Matrix3::identity() - square * m) / (sigma * sigma);
-                let moves = &c * sums.transpose() * by;
-                for (i, row) in moves.row_iter().enumerate() {
-                    out[i] += tau * tau * row.norm_squared();
-                }
+                of(&(&c * sums.transpose() * by));
             }
         }
     });
-    out
 }
 
 /// Covariance of the free unknowns.
@@ -364,8 +380,10 @@ pub fn full_covariance(fit: &Fit) -> Covariance {
 fn covariance_with(fit: &Fit, more: impl Fn(usize, usize) -> f64) -> Covariance {
     let results: Vec<(usize, usize)> =
         fit.free.iter().copied().enumerate().filter(|(_, i)| !fit.model.unknowns[*i].is_set_up()).collect();
+    let excess = visit_excess(fit);
+    let of_visits = |a: usize, b: usize| excess.as_ref().map_or(0.0, |e| e[(a, b)]);
     let row = |&(a, i): &(usize, usize)| -> Vec<f64> {
-        results.iter().map(|&(b, j)| fit.covariance[(i, j)] + more(a, b)).collect()
+        results.iter().map(|&(b, j)| fit.covariance[(i, j)] + of_visits(a, b) + more(a, b)).collect()
     };
     Covariance {
         names: results.iter().map(|(_, i)| fit.model.unknowns[*i].name.clone()).collect(),

@@ -266,8 +266,11 @@ fn with_digits(value: f64, sigma: f64) -> String {
 
 /// Both figures of the noise and where they come from.
 pub(crate) fn noise(noise: &Noise) -> String {
+    let shown = noise.visits_shown.map_or_else(String::new, |shown| {
+        format!("; the residuals show {:.2} µm, which the uncertainties count", um_from_mm(shown.tau_mm))
+    });
     format!(
-        "touch {:.2} µm ({}); index position {:.2} µm ({})",
+        "touch {:.2} µm ({}); index position {:.2} µm ({}{shown})",
         um_from_mm(noise.sigma_mm),
         touch_noise(noise),
         um_from_mm(noise.tau_mm),

@@ -37,6 +37,8 @@ pub struct Case {
     pub planted: &'static [(&'static str, &'static [(&'static str, f64)])],
     /// What the study says of the scatter of visits, mm; `None`: revisits tell it, or the machine's file declares it.
     pub stated_tau_mm: Option<f64>,
+    /// What the machine's file declares of it, mm, all rotary axes together; `None`: as the built-in file does.
+    pub declared_tau_mm: Option<f64>,
 }
 
 /// The cases of the documentation.
@@ -50,6 +52,7 @@ pub const CASES: [Case; 9] = [
         tau_mm: 0.0,
         planted: &[],
         stated_tau_mm: Some(0.0),
+        declared_tau_mm: None,
     },
     // no revisits: both rotary axes scatter as the machine's file declares it
     Case {
@@ -61,6 +64,7 @@ pub const CASES: [Case; 9] = [
         tau_mm: std::f64::consts::FRAC_1_SQRT_2 * 1e-3,
         planted: &[],
         stated_tau_mm: None,
+        declared_tau_mm: None,
     },
     Case {
         machine: "swivel-head",
@@ -71,6 +75,7 @@ pub const CASES: [Case; 9] = [
         tau_mm: 0.0,
         planted: &[],
         stated_tau_mm: None,
+        declared_tau_mm: None,
     },
     Case {
         machine: "swivel-head",
@@ -81,6 +86,7 @@ pub const CASES: [Case; 9] = [
         tau_mm: 0.5e-3,
         planted: &[],
         stated_tau_mm: None,
+        declared_tau_mm: None,
     },
     Case {
         machine: "trunnion",
@@ -91,6 +97,7 @@ pub const CASES: [Case; 9] = [
         tau_mm: 0.0,
         planted: &[],
         stated_tau_mm: Some(0.0),
+        declared_tau_mm: None,
     },
     Case {
         machine: "trunnion",
@@ -101,6 +108,7 @@ pub const CASES: [Case; 9] = [
         tau_mm: 0.5e-3,
         planted: &[],
         stated_tau_mm: None,
+        declared_tau_mm: None,
     },
     Case {
         machine: "double-head",
@@ -111,6 +119,7 @@ pub const CASES: [Case; 9] = [
         tau_mm: 0.5e-3,
         planted: &[],
         stated_tau_mm: None,
+        declared_tau_mm: None,
     },
     Case {
         machine: "swivel-table-b",
@@ -121,6 +130,7 @@ pub const CASES: [Case; 9] = [
         tau_mm: 0.5e-3,
         planted: &[],
         stated_tau_mm: None,
+        declared_tau_mm: None,
     },
     // a time constant among the unknowns: the touches do not depend on it linearly
     Case {
@@ -132,6 +142,7 @@ pub const CASES: [Case; 9] = [
         tau_mm: 0.5e-3,
         planted: &[("warm-up", &[("wx", 5.0), ("wz", 12.0), ("tau", 0.5)])],
         stated_tau_mm: None,
+        declared_tau_mm: None,
     },
 ];
 
@@ -146,6 +157,7 @@ const fn on(machine: &'static str, artefact: &'static str, effects: &'static [&'
         tau_mm: 0.5e-3,
         planted: &[],
         stated_tau_mm: Some(0.5e-3),
+        declared_tau_mm: None,
     }
 }
 
@@ -177,10 +189,45 @@ pub const ARTEFACTS: [Case; 30] = {
     )
 };
 
+/// A scatter of visits that is not as declared, on a plan that comes back to poses and on two that do not.
+#[allow(dead_code)] // of the example
+pub fn scatters() -> Vec<Case> {
+    let mut out = Vec::new();
+    for (machine, programs, effects) in [
+        ("swivel-head", &["head", "table"][..], &["location-b", "location-c", "block-setup", "pretravel"]),
+        ("trunnion", &["basic"], &["location-a", "location-c", "block-setup", "pretravel"]),
+        ("trunnion", &["full"], &["location-a", "location-c", "block-setup", "pretravel"]),
+    ] {
+        for declared_mm in [0.3e-3, 1e-3] {
+            for tau_mm in [0.0, 0.3e-3, 0.7e-3] {
+                let (artefact, planted, stated_tau_mm) = (None, &[][..], None);
+                let declared_tau_mm = Some(declared_mm);
+                out.push(Case {
+                    machine,
+                    programs,
+                    artefact,
+                    effects,
+                    sigma_mm: 1e-3,
+                    tau_mm,
+                    planted,
+                    stated_tau_mm,
+                    declared_tau_mm,
+                });
+            }
+        }
+    }
+    out
+}
+
 /// The machine of a case with what is mounted, and the plans.
 fn mounted(case: &Case) -> (Machine, Vec<Plan>) {
     let Some(artefact) = case.artefact else {
-        let machine = machine(case.machine);
+        let mut machine = machine(case.machine);
+        if let Some(declared_mm) = case.declared_tau_mm {
+            let rotary = machine.rotary().count() as f64;
+            let axes = machine.axes.iter_mut().filter(|a| a.name.is_rotary());
+            axes.for_each(|a| a.indexing_repeatability_mm = declared_mm / rotary.sqrt());
+        }
         let plans = case.programs.iter().map(|p| plan(&machine, p)).collect();
         return (machine, plans);
     };
