@@ -14,6 +14,9 @@ pub const MOST_TIMES: f64 = 3.0;
 /// Values that are tried, from none to the largest.
 const TRIED: usize = 25;
 
+/// Least degrees of freedom: what is known beforehand bounds the scatter, so that its tail is short.
+const LEAST_DOF: f64 = 4.0;
+
 /// With more unknowns, or more touches, the declared value is taken.
 const MOST_UNKNOWNS: usize = 200;
 const MOST_TOUCHES: usize = 20_000;
@@ -82,5 +85,5 @@ pub(super) fn residual_scatter(fit: &Fit) -> Option<Shown> {
     let square = mean(&|t| t);
     // a variance that is estimated with ν degrees of freedom has a variance of its own of 2/ν of its square
     let dof = 2.0 * square * square / mean(&|t| (t - square).powi(2));
-    Some(Shown { tau_mm: square.sqrt(), dof }).filter(|s| s.tau_mm.is_finite() && s.dof.is_finite())
+    Some(Shown { tau_mm: square.sqrt(), dof: dof.max(LEAST_DOF) }).filter(|s| s.tau_mm.is_finite() && s.dof.is_finite())
 }

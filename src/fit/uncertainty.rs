@@ -38,6 +38,8 @@ fn visit_excess(fit: &Fit) -> Option<DMatrix<f64>> {
     let more = shown * shown - fit.noise.tau_mm * fit.noise.tau_mm;
     let mut out = DMatrix::zeros(fit.free.len(), fit.free.len());
     each_visit(fit, |moves| out.gemm(more, moves, &moves.transpose(), 1.0));
+    // as it is without rounding
+    out.fill_upper_triangle_with_lower_triangle();
     Some(out)
 }
 

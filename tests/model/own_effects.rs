@@ -271,7 +271,7 @@ fn a_users_effect_goes_from_simulation_to_identification() {
     file(
         "study.toml",
         "machine = \"swivel-head\"\neffects_file = [\"my-effects.toml\"]\n[[data]]\nplan = \"plan.json\"\nlog = \"head.csv\"\n\
-         controller = \"csv\"\n[model]\neffects = [\"paper-head\", \"my-sag\"]\n",
+         controller = \"csv\"\n[noise]\nvisit_um = 0.0\n[model]\neffects = [\"paper-head\", \"my-sag\"]\n",
     );
     let answer = axiscal(folder.path()).args(["identify", "study.toml", "--json"]).assert().success();
     let answer: serde_json::Value = serde_json::from_slice(&answer.get_output().stdout).unwrap();
