@@ -11,7 +11,7 @@ pub(super) fn say(subject: Subject, candidates: &mut [Candidate]) {
         let Some(effect) = subject.catalogue.get(&candidate.effect, subject.machine) else { continue };
         let value = |parameter: usize| {
             let name = &effect.parameters.get(parameter)?.name;
-            candidate.parameters.iter().find(|p| p.name == *name).map(|p| p.value)
+            candidate.parameters.iter().find(|p| p.name == *name).map(|p| (p.value, p.sigma.unwrap_or(f64::INFINITY)))
         };
         if let Some(point) = turning_point(subject.machine, effect, value) {
             candidate.says = words::turning(&candidate.says, &point);

@@ -107,6 +107,7 @@ pub(super) fn assemble_result(
         noise_dof: fit.noise.dof,
         visit_dof: fit.noise.visit_dof,
         visit_um: um_from_mm(fit.noise.tau_mm),
+        visit_shown_um: fit.noise.visits_shown.map(|shown| um_from_mm(shown.tau_mm)),
         visit_source: fit.noise.visit_source,
         noise_says: words::noise(&fit.noise),
         chi2_per_dof: if fit.dof > 0 { fit.chi2 / fit.dof as f64 } else { f64::NAN },
@@ -144,7 +145,8 @@ fn turns_about(fit: &Fit, machine: &Machine, effects: &[&Effect], status: &[Stat
         let value = |parameter: usize| {
             let name = &effect.parameters.get(parameter)?.name;
             let i = fit.model.unknowns.iter().position(|u| u.effect == effect.id && u.name == *name)?;
-            matches!(status[i], Status::Identified | Status::Fixed).then(|| fit.theta[i])
+            let known = matches!(status[i], Status::Identified | Status::Fixed);
+            known.then(|| (fit.theta[i], fit.covariance[(i, i)].max(0.0).sqrt()))
         };
         let (Arm::Distance { parameter, .. } | Arm::Displaced { turn: (parameter, _), .. }) = effect.arm?;
         let says = words::turning_point(&turning_point(machine, effect, value)?);
@@ -204,12 +206,16 @@ impl<'a> Evidence<'a> {
 
     /// Variance from noise and priors.
     fn variance(&self, c: usize) -> f64 {
-        let as_weighted = self.fit.covariance[(self.fit.free[c], self.fit.free[c])];
         // of visits that scatter less or more than the weights suppose
         let noise = &self.fit.noise;
         let shown = noise.visits_shown.map(|shown| shown.tau_mm).filter(|tau| *tau > 0.0);
         let more = shown.map_or(0.0, |tau| 1.0 - (noise.tau_mm / tau).powi(2));
-        as_weighted + more * self.by_visits[c]
+        self.weighted_variance(c) + more * self.by_visits[c]
+    }
+
+    /// The same if visits scattered as the weights suppose.
+    fn weighted_variance(&self, c: usize) -> f64 {
+        self.fit.covariance[(self.fit.free[c], self.fit.free[c])]
     }
 
     /// What of it the priors make.
@@ -316,7 +322,10 @@ impl<'a> Evidence<'a> {
         };
         let with_unmodelled = known.zip(self.unmodelled.as_ref()).zip(sigma).map(|((c, all), s)| {
             // what counts beside the noise counts here, too
-            (all.sigma[c] * all.sigma[c] + (s * s - self.variance(c)).max(self.by_type_b[c])).sqrt()
+            let by_more_visits = self.variance(c) - self.weighted_variance(c);
+            (all.sigma[c] * all.sigma[c] + by_more_visits + (s * s - self.variance(c)).max(self.by_type_b[c]))
+                .max(s * s)
+                .sqrt()
         });
         let interval = interval.or(bound).filter(|ends| u.shape || is_uneven(value, *ends, usual));
         Parameter {

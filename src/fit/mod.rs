@@ -142,7 +142,7 @@ fn identify_from(
         remarks: Vec::new(),
         outcome: Outcome::default(),
     };
-    fit.noise.visits_shown = if settings.bare { None } else { residual_scatter::residual_scatter(&fit) };
+    fit.noise.visits_shown = residual_scatter::residual_scatter(&fit, settings.bare || settings.quick);
     let is_small = fit.data.observations.len() <= uncertainty::MOST_UNMODELLED;
     let type_b = type_b::type_b(&fit, machine, catalogue, &settings.type_b)?;
     fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();

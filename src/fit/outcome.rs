@@ -48,7 +48,10 @@ pub struct Outcome {
     pub noise_dof: Option<f64>,
     /// Scatter per index visit, µm.
     pub visit_um: f64,
-    /// Where that comes from.
+    /// The same as the residuals show it, µm, where only a declared one is known: uncertainties are computed with it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub visit_shown_um: Option<f64>,
+    /// Where `visit_um` comes from.
     #[serde(default)]
     pub visit_source: VisitSource,
     /// Degrees of freedom of that; none where it is taken as known.

@@ -1,4 +1,4 @@
-//! The scatter of index positions as the residuals of a fit show it, where no pose is revisited and only a declared value is known.
+//! The scatter of index positions as the residuals of a fit show it, where revisits do not tell it and only a declared value is known.
 //!
 //! Touches of one index position share a displacement: what the residuals of an index position have in common beyond the model says
 //! how far it goes. Restricted maximum likelihood (Patterson and Thompson, Biometrika 58 (1971) 545):
@@ -17,9 +17,9 @@ const TRIED: usize = 25;
 /// Least degrees of freedom: what is known beforehand bounds the scatter, so that its tail is short.
 const LEAST_DOF: f64 = 4.0;
 
-/// With more unknowns, or more touches, the declared value is taken.
+/// With more unknowns, or more touches (in trial fits, in others), the declared value is taken.
 const MOST_UNKNOWNS: usize = 200;
-const MOST_TOUCHES: usize = 20_000;
+const MOST_TOUCHES: [usize; 2] = [2_000, 20_000];
 
 /// What is known of the scatter before a measurement, as a part of −2 ln L: a declared value is uncertain by 0.7 of itself.
 #[must_use]
@@ -37,9 +37,10 @@ pub struct Shown {
 }
 
 /// The scatter of index positions; `None` where it is known otherwise.
-pub(super) fn residual_scatter(fit: &Fit) -> Option<Shown> {
+pub(super) fn residual_scatter(fit: &Fit, is_trial: bool) -> Option<Shown> {
     let (sigma_mm, declared_mm) = (fit.noise.sigma_mm, fit.noise.tau_mm);
-    let is_small = fit.free.len() <= MOST_UNKNOWNS && fit.data.observations.len() <= MOST_TOUCHES;
+    let is_small =
+        fit.free.len() <= MOST_UNKNOWNS && fit.data.observations.len() <= MOST_TOUCHES[usize::from(!is_trial)];
     if fit.noise.visit_source != VisitSource::Declared || declared_mm <= 0.0 || !is_small {
         return None;
     }
@@ -82,8 +83,15 @@ pub(super) fn residual_scatter(fit: &Fit) -> Option<Shown> {
     let likely = |deviance: f64| (-0.5 * (deviance - least)).exp();
     let all: f64 = each.iter().map(|(_, deviance)| likely(*deviance)).sum();
     let mean = |of: &dyn Fn(f64) -> f64| each.iter().map(|(tau, d)| likely(*d) * of(tau * tau)).sum::<f64>() / all;
-    let square = mean(&|t| t);
+    // a value lies anywhere within its step
+    let step_mm = MOST_TIMES * declared_mm / (TRIED - 1) as f64;
+    let within = step_mm * step_mm / 12.0;
+    let square = mean(&|t| t) + within;
+    let variance = mean(&|t| (t + within - square).powi(2)) + 4.0 * square * within;
     // a variance that is estimated with ν degrees of freedom has a variance of its own of 2/ν of its square
-    let dof = 2.0 * square * square / mean(&|t| (t - square).powi(2));
-    Some(Shown { tau_mm: square.sqrt(), dof: dof.max(LEAST_DOF) }).filter(|s| s.tau_mm.is_finite() && s.dof.is_finite())
+    let dof = 2.0 * square * square / variance;
+    // more than the largest that is tried is possible: nothing is sure then
+    let is_beyond = each.last().is_some_and(|(_, deviance)| *deviance <= least);
+    let dof = if is_beyond { LEAST_DOF } else { dof.max(LEAST_DOF) };
+    Some(Shown { tau_mm: square.sqrt(), dof }).filter(|s| s.tau_mm.is_finite() && s.dof.is_finite())
 }

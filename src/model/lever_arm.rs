@@ -94,10 +94,17 @@ pub enum From {
     Pivot,
 }
 
-/// Where the point lies about which an effect turns its axis; `value`: of each of its parameters, by its place, in its unit. None
-/// where the effect has no such point, or hardly turns.
+/// A turn is one where it is so many standard uncertainties.
+const SURE: f64 = 3.0;
+
+/// Where the point lies about which an effect turns its axis; `value`: of each of its parameters, by its place, and its standard
+/// uncertainty, in its unit. None where the effect has no such point, hardly turns, or may not turn at all.
 #[must_use]
-pub fn turning_point(machine: &Machine, effect: &Effect, value: impl Fn(usize) -> Option<f64>) -> Option<TurningPoint> {
+pub fn turning_point(
+    machine: &Machine,
+    effect: &Effect,
+    value: impl Fn(usize) -> Option<(f64, f64)>,
+) -> Option<TurningPoint> {
     let (Place::Before(name) | Place::After(name)) = effect.terms.first()?.place else { return None };
     let axis = machine.axis(name)?;
     let ball = machine.reference.ball;
@@ -110,22 +117,27 @@ pub fn turning_point(machine: &Machine, effect: &Effect, value: impl Fn(usize) -
     };
     let off = |along: usize, mm: f64| (along, stated[along] - ball[along] + mm);
     let off_mm = match effect.arm? {
-        Arm::Distance { parameter, along } => vec![off(along, value(parameter)?)],
+        Arm::Distance { parameter, along } => vec![off(along, value(parameter)?.0)],
         Arm::Displaced { turn, shifts } => {
-            // a turn θω̂ and a displacement t leave the point ω̂ × t/θ where it is; µm over µrad are metres
-            let factor = |parameter: usize| Some(value(parameter)? * effect.parameters.get(parameter)?.factor);
-            let theta = factor(turn.0)?;
+            // a turn θω̂ and a displacement t leave the point ω̂ × t/θ where it is
+            let factor = |parameter: usize| effect.parameters.get(parameter).map(|p| p.factor);
+            let (theta, sigma) = value(turn.0)?;
+            if theta.abs() <= SURE * sigma {
+                return None;
+            }
             let mut t = Vector3::zeros();
             for (parameter, along) in shifts {
-                t[along] = factor(parameter)?;
+                t[along] = value(parameter)?.0 * factor(parameter)?;
             }
             let mut about = Vector3::zeros();
             about[turn.1] = 1.0;
-            let point = about.cross(&t) / theta;
-            if !point.norm().is_finite() || point.norm() > 2.0 * FARTHEST_MM {
+            let point = about.cross(&t) / (theta * factor(turn.0)?);
+            let off_mm: Vec<(usize, f64)> = shifts.iter().map(|&(_, along)| off(along, point[along])).collect();
+            let far_mm = off_mm.iter().map(|(_, mm)| mm * mm).sum::<f64>().sqrt();
+            if !far_mm.is_finite() || far_mm > 2.0 * FARTHEST_MM {
                 return None;
             }
-            shifts.iter().map(|&(_, along)| off(along, point[along])).collect()
+            off_mm
         }
     };
     Some(TurningPoint { axis: name, off_mm, from })
@@ -158,7 +170,7 @@ mod tests {
             let machine = crate::machine::built_in(machine).unwrap().unwrap();
             let effect = catalogue.get(id, &machine).unwrap();
             let is_arm = |i: usize| effect.parameters[i].name.starts_with("arm_");
-            turning_point(&machine, effect, |i| Some(if is_arm(i) { arm_mm } else { 0.0 }))
+            turning_point(&machine, effect, |i| Some((if is_arm(i) { arm_mm } else { 0.0 }, 0.0)))
         };
         // C of the table: its arm counts from the height of the ball
         let below = TurningPoint { axis: AxisName::C, off_mm: vec![(2, -180.0)], from: From::Ball };
@@ -181,16 +193,21 @@ mod tests {
         let effect = catalogue.get("angular-cy", &machine).unwrap();
         let value = |x: f64, y: f64, turn: f64| {
             move |i: usize| match effect.parameters[i].name.as_str() {
-                "ECY" => Some(turn),
-                "ECY_x" => Some(x),
-                _ => Some(y),
+                "ECY" => Some((turn, 5.0)),
+                "ECY_x" => Some((x, 0.1)),
+                _ => Some((y, 0.1)),
             }
         };
         let point = turning_point(&machine, effect, value(-15.0, -5.0, 50.0)).unwrap();
         let [(0, x), (1, y)] = point.off_mm[..] else { panic!("{point:?}") };
         assert!((x - 100.0).abs() < 1e-9 && (y + 300.0).abs() < 1e-9, "{point:?}");
-        // a scale is no turn
-        assert_eq!(turning_point(&machine, effect, value(0.0, 5.0, 1.0)), None);
+        // a scale is no turn, and what may not turn at all has no point
+        assert_eq!(
+            turning_point(&machine, effect, value(0.0, 5.0, 16.0)).map(|p| p.off_mm),
+            Some(vec![(0, -312.5), (1, 0.0)])
+        );
+        assert_eq!(turning_point(&machine, effect, value(0.0, 5.0, 14.0)), None);
+        assert_eq!(turning_point(&machine, effect, value(0.0, 50.0, 16.0)), None);
     }
 
     #[test]

@@ -267,7 +267,7 @@ fn with_digits(value: f64, sigma: f64) -> String {
 /// Both figures of the noise and where they come from.
 pub(crate) fn noise(noise: &Noise) -> String {
     let shown = noise.visits_shown.map_or_else(String::new, |shown| {
-        format!("; the residuals show {:.2} µm, which the uncertainties count", um_from_mm(shown.tau_mm))
+        format!("; the residuals show {:.2} µm, and the uncertainties are computed with that", um_from_mm(shown.tau_mm))
     });
     format!(
         "touch {:.2} µm ({}); index position {:.2} µm ({}{shown})",

@@ -33,8 +33,8 @@ pub fn badly_placed(better: &BetterPlace) -> Finding {
 pub fn built_in_taken(taken: &Taken) -> String {
     let Taken { program, worth, of_choice } = taken;
     format!(
-        "these are the touches of the built-in program {program}: its worst location error has a standard uncertainty of {:.2} of \
-         the usual size and it finds {} effects of their usual size; other touches in the same time: {:.2} and {}",
+        "these are the touches of the built-in program {program}: it measures the worst location error to {:.3} of its usual size \
+         (one standard uncertainty) and detects {} effects if they have their usual size; chosen touches: {:.3} and {}",
         worth.worst, worth.found, of_choice.worst, of_choice.found
     )
 }

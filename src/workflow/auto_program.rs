@@ -167,7 +167,7 @@ pub fn auto_program(
     Ok(AutoProgram { text, spec, better, taken: None })
 }
 
-/// The built-in program for this machine and mounting that a choice does not reach in the same time.
+/// The built-in program for this machine and mounting that a choice does not reach: of about the same time, or better in everything.
 fn better_written(
     machine: &Machine,
     catalogue: &Catalogue,
@@ -179,18 +179,23 @@ fn better_written(
     for (spec, text) in program::written_for(machine, &mounting.name)? {
         // a mounting that was changed may no longer suit it
         let Ok((made, _)) = program::generate(machine, &spec, &Options::default()) else { continue };
-        if made.path.seconds <= USED[1] * budget_s {
-            written.push((Worth::of(&view_of(machine, catalogue, made.plan)?), spec.name, text));
+        let used = made.path.seconds / budget_s;
+        if used <= USED[1] && made.plan.skipped.is_empty() {
+            let is_as_long = used >= USED[0];
+            written.push((Worth::of(&view_of(machine, catalogue, made.plan)?), is_as_long, spec.name, text));
         }
     }
-    let Some((worth, name, text)) = written.into_iter().min_by(|a, b| a.0.worst.total_cmp(&b.0.worst)) else {
-        return Ok(None);
-    };
-    let (chosen, _) = program::generate(machine, choice, &Options::default())?;
-    let of_choice = Worth::of(&view_of(machine, catalogue, chosen.plan)?);
-    if of_choice.is_as_good_as(&worth) {
+    if written.is_empty() {
         return Ok(None);
     }
+    let (chosen, _) = program::generate(machine, choice, &Options::default())?;
+    let of_choice = Worth::of(&view_of(machine, catalogue, chosen.plan)?);
+    written.retain(|(worth, is_as_long, ..)| {
+        !of_choice.is_as_good_as(worth) && (*is_as_long || worth.is_as_good_as(&of_choice))
+    });
+    let Some((worth, _, name, text)) = written.into_iter().min_by(|a, b| a.0.worst.total_cmp(&b.0.worst)) else {
+        return Ok(None);
+    };
     let text = renamed(text, &name)?;
     let (spec, _) = program::load(&source("auto.toml", text.clone()))?;
     Ok(Some(AutoProgram { text, spec, better: None, taken: Some(Taken { program: name, worth, of_choice }) }))
