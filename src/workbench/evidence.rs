@@ -59,7 +59,7 @@ pub fn scores(state: &Snapshot) -> Vec<Scored> {
     let named = Named::for_fit(fit, &evidence, &opened.machine, &opened.catalogue);
     let search = Search::new(evidence.question(), &named.library);
     let total = evidence.residual.norm_squared().max(f64::MIN_POSITIVE);
-    let pictures = (MOST_NUMBERS / fit.data.observations.len().max(1)).clamp(3, 10);
+    let pictures = (MOST_NUMBERS / fit.data.observations.len().max(1)).clamp(3, 30);
     let drawn: std::collections::HashSet<usize> =
         search.ranking().into_iter().filter(|&i| search.scores[i].visible()).take(pictures).collect();
     let colours = evidence.colours_um(fit);
