@@ -31,7 +31,10 @@ pub(super) fn open(seen: &Examination) -> Open {
             shape: seen.named.scanned[candidate].as_ref().map(|_| shape),
         }
     };
-    let mut suspects: Vec<Suspect> = first.members.iter().map(|m| suspect(m.candidate)).collect();
+    // no touches separate an effect from one of which it is a special case: the simpler one is asked about
+    let simplest = &seen.named.effects[first.first()].id;
+    let own = first.members.iter().filter(|m| !seen.named.effects[m.candidate].includes.contains(simplest));
+    let mut suspects: Vec<Suspect> = own.map(|m| suspect(m.candidate)).collect();
     let n = suspects.len();
     let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).collect();
     for group in seen.groups[1..].iter().filter(tied) {
