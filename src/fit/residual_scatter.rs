@@ -17,7 +17,7 @@ const TRIED: usize = 25;
 /// Least degrees of freedom: what is known beforehand bounds the scatter, so that its tail is short.
 const LEAST_DOF: f64 = 4.0;
 
-/// With more unknowns, or more touches (in trial fits, in others), the declared value is taken.
+/// With more unknowns, or with more touches (first: in a trial fit, second: in any other), the declared value is taken.
 const MOST_UNKNOWNS: usize = 200;
 const MOST_TOUCHES: [usize; 2] = [2_000, 20_000];
 

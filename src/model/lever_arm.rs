@@ -1,5 +1,5 @@
 //! A turn about a bearing or a carriage that stands somewhere else than where rotations are stated: besides the turn, what it turns
-//! is displaced in proportion to the distance. Nobody knows that distance, so that it is a parameter of the shape.
+//! is displaced in proportion to the distance. That distance is unknown, so that it is a parameter.
 
 use super::as_written::{EffectAsWritten, Grid, Placed, Scan, ShapeAsWritten, TermAsWritten};
 use super::catalogue::{Effect, Place};
