@@ -5,7 +5,8 @@
 
 use super::bundle::{Bundle, cost_s};
 use super::choose_touches::typical_columns;
-use super::linearised_plan::LinearisedPlan;
+use super::linearised_plan::{LinearisedPlan, STYLUS_S};
+use crate::fit::whitening::VisitNormals;
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -22,6 +23,9 @@ const MOST_AGAIN: usize = 3;
 /// Prior of the model's unknowns, in typical sizes: wide, for a firm start only.
 const WIDE: f64 = 30.0;
 
+/// Visits whose gains are computed at a time.
+const AT_ONCE: usize = 32;
+
 /// What was chosen from a pool.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
@@ -33,25 +37,62 @@ pub struct Choice {
     pub worst: f64,
 }
 
-/// Chooses bundles within a time, s. `view`: the touches of the pool, one after the other.
+/// What the touches of a pool tell: columns in typical sizes over the noise of a touch, a row for each touch.
+#[derive(Debug, Clone)]
+pub struct Tells {
+    rows: DMatrix<f64>,
+    /// What the scatter of index visits, mm, moves together.
+    visits: VisitNormals,
+    tau_mm: f64,
+    /// Columns of the model; those of the other effects follow.
+    n_base: usize,
+    /// Columns of the model's results: what the set-ups take is none.
+    results: Vec<usize>,
+}
+
+impl Tells {
+    /// `view`: the touches of the pool, one after the other, without a scatter of visits. `tau_mm`: this scatter.
+    #[must_use]
+    pub fn of(view: &LinearisedPlan, tau_mm: f64) -> Self {
+        let (columns, n_base) = typical_columns(view);
+        let rows = columns.rows(0, view.n_touches()).into_owned();
+        let results = (0..n_base).filter(|&c| !view.model.unknowns[view.free[c]].nuisance).collect();
+        Self { rows, visits: view.visit_normals(), tau_mm, n_base, results }
+    }
+
+    /// Some of the touches only, in ascending order.
+    #[must_use]
+    pub fn only(&self, touches: &[usize]) -> Self {
+        let (rows, visits) = (self.rows.select_rows(touches), self.visits.only(touches));
+        Self { rows, visits, tau_mm: self.tau_mm, n_base: self.n_base, results: self.results.clone() }
+    }
+
+    fn whitened(&self) -> DMatrix<f64> {
+        let mut rows = self.rows.clone();
+        self.visits.change(0.0, self.tau_mm).apply(&mut rows);
+        rows
+    }
+}
+
+/// Chooses bundles within a time, s. `tells`: the touches of the pool, one after the other.
 #[must_use]
-pub fn choose(view: &LinearisedPlan, pool: &[Bundle], budget_s: f64) -> Choice {
-    let (columns, n_base) = typical_columns(view);
-    let rows = columns.rows(0, view.n_touches()).into_owned();
+pub fn choose(tells: &Tells, pool: &[Bundle], budget_s: f64) -> Choice {
+    let (n_base, results) = (tells.n_base, &tells.results);
+    let rows = tells.whitened();
     let visits = Visits::of(pool);
-    // what the set-ups take is no result
-    let results: Vec<usize> = (0..n_base).filter(|&c| !view.model.unknowns[view.free[c]].nuisance).collect();
 
     let mut chosen = Vec::new();
-    let mut of_model = Covariance::new(rows.columns(0, n_base).into_owned(), |_| WIDE * WIDE);
-    let worst = |c: &Covariance, r: &Range<usize>| c.worst_falls(r, &results);
-    of_model.fill(pool, &visits, &mut chosen, FOR_RESULTS * budget_s, &worst);
+    let of_base = rows.columns(0, n_base).into_owned();
+    let mut of_model = Covariance::new(&of_base, |_| WIDE * WIDE);
+    let worst = |c: &Covariance, r: &Range<usize>| c.worst_falls(r, results);
+    of_model.fill(pool, &visits, &mut chosen, FOR_RESULTS * budget_s, Falls::Anyhow, &worst);
     let of_results = chosen.len();
 
     // an effect of the catalogue has its typical size
-    let mut of_all = Covariance::new(rows, |c| if c < n_base { WIDE * WIDE } else { 1.0 });
+    let mut of_all = Covariance::new(&rows, |c| if c < n_base { WIDE * WIDE } else { 1.0 });
     chosen.iter().for_each(|&i: &usize| of_all.take(&visits.rows[i]));
-    of_all.fill(pool, &visits, &mut chosen, (1.0 - FOR_AGAIN) * budget_s, &Covariance::information);
+    let most_s = (1.0 - FOR_AGAIN) * budget_s;
+    of_all.fill(pool, &visits, &mut chosen, most_s, Falls::Always, &Covariance::information);
 
     // plain poses: what is done differently at a pose is no repeat of it
     let mut again: Vec<usize> = Vec::new();
@@ -98,31 +139,44 @@ impl Visits {
     fn cost_s(&self, pool: &[Bundle], visits: &[usize]) -> f64 {
         cost_s(pool, &self.members(visits))
     }
+
+    /// What one more visit takes, s: a stylus that is in use already need not be changed.
+    fn more_s(&self, pool: &[Bundle], visits: &[usize], more: usize) -> f64 {
+        let stylus = |v: usize| pool[self.bundles[v].start].manner.stylus.as_deref();
+        let is_in_use = stylus(more).is_some() && visits.iter().any(|&v| stylus(v) == stylus(more));
+        self.cost_s(pool, &[more]) - if is_in_use { STYLUS_S } else { 0.0 }
+    }
+}
+
+/// What becomes of a gain as more is taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Falls {
+    /// It becomes smaller: one that was computed before bounds the present one.
+    Always,
+    /// It may also become larger.
+    Anyhow,
 }
 
 /// Covariance of all unknowns after what was taken.
-struct Covariance {
+struct Covariance<'a> {
     /// Whitened columns: a row for each touch of the pool.
-    rows: DMatrix<f64>,
+    rows: &'a DMatrix<f64>,
     covariance: DMatrix<f64>,
-    /// `rows` times the covariance.
-    seen: DMatrix<f64>,
 }
 
-impl Covariance {
+impl<'a> Covariance<'a> {
     /// Nothing is taken yet: the prior variance of each column.
-    fn new(rows: DMatrix<f64>, prior: impl Fn(usize) -> f64) -> Self {
+    fn new(rows: &'a DMatrix<f64>, prior: impl Fn(usize) -> f64) -> Self {
         let variances = DVector::from_iterator(rows.ncols(), (0..rows.ncols()).map(prior));
-        let covariance = DMatrix::from_diagonal(&variances);
-        Self { seen: &rows * &covariance, rows, covariance }
+        Self { rows, covariance: DMatrix::from_diagonal(&variances) }
     }
 
     /// A factor of I + A C Aᵀ for the rows A of a bundle, and A C.
     fn of(&self, range: &Range<usize>) -> Option<(Cholesky<f64, Dyn>, DMatrix<f64>)> {
-        let seen = self.seen.rows(range.start, range.len());
-        let within = seen * self.rows.rows(range.start, range.len()).transpose();
-        let factor = (within + DMatrix::identity(range.len(), range.len())).cholesky()?;
-        Some((factor, seen.into_owned()))
+        let own = self.rows.rows(range.start, range.len());
+        let seen = own * &self.covariance;
+        let within = &seen * own.transpose();
+        Some(((within + DMatrix::identity(range.len(), range.len())).cholesky()?, seen))
     }
 
     /// By how much the worst variances of some columns fall: the fourth power of the standard deviations stands for the worst.
@@ -148,7 +202,6 @@ impl Covariance {
     fn take(&mut self, range: &Range<usize>) {
         let Some((factor, mut change)) = self.of(range) else { return };
         if factor.l_dirty().solve_lower_triangular_mut(&mut change) {
-            self.seen -= (&self.rows * change.transpose()) * &change;
             self.covariance -= change.tr_mul(&change);
         }
     }
@@ -160,24 +213,40 @@ impl Covariance {
         visits: &Visits,
         chosen: &mut Vec<usize>,
         budget_s: f64,
+        falls: Falls,
         gain: &(dyn Fn(&Self, &Range<usize>) -> Option<f64> + Sync),
     ) {
+        // no visit gains more than this
+        let mut bound = vec![f64::INFINITY; visits.rows.len()];
         loop {
+            if falls == Falls::Anyhow {
+                bound.fill(f64::INFINITY);
+            }
             let spent = visits.cost_s(pool, chosen);
             let per_second = |i: usize| {
-                let seconds = visits.cost_s(pool, &[&chosen[..], &[i]].concat());
-                let gain = (seconds <= budget_s).then(|| gain(self, &visits.rows[i]))??;
-                Some((gain / (seconds - spent), i)).filter(|g| g.0 > 0.0)
+                let seconds = visits.more_s(pool, chosen, i);
+                (spent + seconds <= budget_s && !chosen.contains(&i)).then(|| (bound[i] / seconds, seconds, i))
             };
-            let open = (0..visits.rows.len()).into_par_iter().filter(|i| !chosen.contains(i));
-            // ties go to the earlier visit: the same choice in every run
-            match open.filter_map(per_second).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))) {
-                Some((_, i)) => {
-                    self.take(&visits.rows[i]);
-                    chosen.push(i);
+            let mut open: Vec<(f64, f64, usize)> = (0..bound.len()).filter_map(per_second).collect();
+            open.sort_by(|a, b| b.0.total_cmp(&a.0));
+            let mut best: Option<(f64, usize)> = None;
+            for some in open.chunks(AT_ONCE) {
+                if best.is_some_and(|(gain, _)| some[0].0 < gain) {
+                    break;
                 }
-                None => return,
+                let gains = some.par_iter().map(|&(_, _, i)| gain(self, &visits.rows[i]).unwrap_or(0.0));
+                for (&(_, seconds, i), gain) in some.iter().zip(gains.collect::<Vec<f64>>()) {
+                    bound[i] = gain;
+                    let gain = gain / seconds;
+                    // ties go to the earlier visit: the same choice in every run
+                    if gain > 0.0 && best.is_none_or(|(most, at)| gain > most || (gain == most && i < at)) {
+                        best = Some((gain, i));
+                    }
+                }
             }
+            let Some((_, i)) = best else { return };
+            self.take(&visits.rows[i]);
+            chosen.push(i);
         }
     }
 }

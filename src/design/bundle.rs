@@ -525,21 +525,30 @@ fn decimal(x: f64) -> String {
     format!("{x:?}")
 }
 
-/// Touches that the program's proof left out: which of a bundle's faces must not be asked for again.
+/// Did a program's proof leave out this face of a bundle?
 #[must_use]
-pub fn without(pool: &[Bundle], skipped: &[plan::Skipped]) -> Vec<Bundle> {
-    let is_out = |b: &Bundle, face: &str| {
-        skipped
-            .iter()
-            .any(|s| s.stage == stage_of(&b.manner) && s.block == b.block && s.face == face && s.pose == b.manner.pose)
-    };
-    pool.iter()
-        .filter_map(|b| {
+pub fn is_skipped(b: &Bundle, face: &str, skipped: &[plan::Skipped]) -> bool {
+    skipped
+        .iter()
+        .any(|s| s.stage == stage_of(&b.manner) && s.block == b.block && s.face == face && s.pose == b.manner.pose)
+}
+
+/// A pool without some faces, and which of its touches are left. `is_out`: number in the pool, bundle, face.
+#[must_use]
+pub fn without(pool: &[Bundle], is_out: impl Fn(usize, &Bundle, &str) -> bool) -> (Vec<Bundle>, Vec<usize>) {
+    let (mut bundles, mut touches) = (Vec::new(), Vec::new());
+    let mut at = 0;
+    for (i, b) in pool.iter().enumerate() {
+        let own: Vec<usize> = (0..b.touches.len()).filter(|k| !is_out(i, b, &b.touches[*k].face)).collect();
+        if own.len() >= 3 {
+            touches.extend(own.iter().map(|k| at + k));
             let mut left = b.clone();
-            left.faces.retain(|f| !is_out(b, f));
-            left.ring.retain(|r| !is_out(b, &r.label));
-            left.touches.retain(|t| left.faces.contains(&t.face) || left.ring.iter().any(|r| r.label == t.face));
-            (left.touches.len() >= 3).then_some(left)
-        })
-        .collect()
+            left.faces.retain(|face| !is_out(i, b, face));
+            left.ring.retain(|r| !is_out(i, b, &r.label));
+            left.touches = own.iter().map(|k| b.touches[*k].clone()).collect();
+            bundles.push(left);
+        }
+        at += b.touches.len();
+    }
+    (bundles, touches)
 }

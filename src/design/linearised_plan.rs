@@ -6,7 +6,7 @@ use crate::diag::{Failure, Result};
 use crate::fit::candidates::{NoValue, columns, without_value};
 use crate::fit::normal::Touches;
 use crate::fit::uncertainty::unmodelled_by;
-use crate::fit::whitening::Whitening;
+use crate::fit::whitening::{VisitNormals, Whitening};
 use crate::fit::{design_jacobian, every_formula_has_a_value, free_in_a_design, jumps_in_a_design, scan};
 use crate::log::{Status, Touch};
 use crate::machine::Machine;
@@ -386,6 +386,11 @@ impl LinearisedPlan {
     /// What whitens columns of the touches.
     pub(super) fn whitening(&self) -> Whitening {
         whitening(&self.model, &self.data, &self.theta, &self.free, self.noise, |t| t.whitening())
+    }
+
+    /// Which touches a scatter of visits would move together, and where to.
+    pub(super) fn visit_normals(&self) -> VisitNormals {
+        whitening(&self.model, &self.data, &self.theta, &self.free, self.noise, |t| t.visit_normals())
     }
 
     /// Share of a block's norm that the model cannot follow.

@@ -97,17 +97,36 @@ struct Directions {
     pub axes: Matrix3<f64>,
 }
 
+impl Directions {
+    fn of(normals: Normals) -> Self {
+        let eigen = normals.tr_mul(&normals).symmetric_eigen();
+        Self { squares: eigen.eigenvalues, axes: eigen.eigenvectors, normals }
+    }
+}
+
 impl VisitNormals {
     /// Of touches in their order: their visits, and their outward normals in R, each times the root of its weight.
     pub fn new(visits: &[usize], normals: &[Vector3<f64>], sigma_mm: f64) -> Self {
         let mut at = 0;
         let of = |visit: &[usize]| {
-            let own = &normals[at..at + visit.len()];
             at += visit.len();
-            let eigen = own.iter().fold(Matrix3::zeros(), |sum, n| sum + n * n.transpose()).symmetric_eigen();
-            Directions { normals: normals_of(own), squares: eigen.eigenvalues, axes: eigen.eigenvectors }
+            Directions::of(normals_of(&normals[at - visit.len()..at]))
         };
         Self { visits: visits.chunk_by(|a, b| a == b).map(of).collect(), sigma_mm }
+    }
+
+    /// Of some of the touches only, in ascending order.
+    #[must_use]
+    pub fn only(&self, touches: &[usize]) -> Self {
+        let (mut place, mut from) = (0, 0);
+        let of = |visit: &Directions| {
+            let to = from + visit.normals.nrows();
+            let end = touches.partition_point(|&touch| touch < to);
+            let rows: Vec<usize> = touches[place..end].iter().map(|touch| touch - from).collect();
+            (place, from) = (end, to);
+            (!rows.is_empty()).then(|| Directions::of(visit.normals.select_rows(&rows)))
+        };
+        Self { visits: self.visits.iter().filter_map(of).collect(), sigma_mm: self.sigma_mm }
     }
 
     /// Variance along a principal axis in units of a touch's, where each component of a visit's displacement scatters by τ.

@@ -2,9 +2,9 @@
 //! measures better in the same time.
 
 use super::new::default_effects;
-use crate::design::auto_plan::{Choice, choose};
+use crate::design::auto_plan::{Choice, Tells, choose};
 use crate::design::bundle::{
-    Bundle, Head, SWIVELS_WIDE_DEG, VisitOf, as_plan, bundles, program_text, too_narrow, without,
+    Bundle, Head, SWIVELS_WIDE_DEG, VisitOf, as_plan, bundles, is_skipped, program_text, too_narrow, without,
 };
 use crate::design::worth::Worth;
 use crate::design::{LinearisedPlan, Noise, Planned, Task};
@@ -96,18 +96,16 @@ pub fn auto_program(
     let mut best: Option<(f64, String)> = None;
     let mut worst = f64::INFINITY;
     let mut why: Option<Failure> = None;
-    // what the touches of the pool see, and how many these are: a pool only becomes smaller
-    let mut pool_seen: Option<(usize, LinearisedPlan)> = None;
+    let mut known: Option<Tells> = None;
     for _ in 0..MOST_ROUNDS {
         if pool.is_empty() {
             break;
         }
-        let touches: usize = pool.iter().map(|bundle| bundle.touches.len()).sum();
-        if pool_seen.as_ref().is_none_or(|(seen, _)| *seen != touches) {
-            pool_seen = Some((touches, linearised(machine, catalogue, mounting, &pool, budget_s)?));
-        }
-        let Some((_, view)) = &pool_seen else { break };
-        let choice = choose(view, &pool, budget_s * scale);
+        let tells = match known.take() {
+            Some(of_pool) => of_pool,
+            None => linearised(machine, catalogue, mounting, &pool, budget_s)?,
+        };
+        let choice = choose(&tells, &pool, budget_s * scale);
         if choice.chosen.is_empty() {
             break;
         }
@@ -118,27 +116,30 @@ pub fn auto_program(
             Err(failure) => {
                 // nothing of it can be reached: what was chosen is no choice
                 why = Some(failure);
-                let mut at = 0..;
-                pool.retain(|_| !choice.chosen.contains(&at.next().unwrap_or_default()));
+                let (left, touches) = without(&pool, |i, _, _| choice.chosen.contains(&i));
+                (pool, known) = (left, Some(tells.only(&touches)));
                 continue;
             }
         };
         let used = made.path.seconds / budget_s;
         let lost = made.plan.skipped.len() as f64 / (made.plan.skipped.len() + made.plan.touches.len()) as f64;
+        // what is left of the same choice is a program without a gap
         if !made.plan.skipped.is_empty() {
-            // what is left of the same choice is a program without a gap
-            let left = without(&pool, &made.plan.skipped);
+            let (left, touches) = without(&pool, |_, b, face| is_skipped(b, face, &made.plan.skipped));
             let again = |of: &[usize]| -> Vec<usize> {
                 let same = |i: &usize| left.iter().position(|b| b.is_of(&pool[*i]));
                 of.iter().filter_map(same).collect()
             };
             let kept = Choice { chosen: again(&choice.chosen), again: again(&choice.again), worst: choice.worst };
+            known = Some(tells.only(&touches));
             if kept.chosen.is_empty() {
                 pool = left;
                 continue;
             }
             text = write(&left, &kept);
             pool = left;
+        } else {
+            known = Some(tells);
         }
         let worth = used - 2.0 * lost;
         if used <= USED[1] && best.as_ref().is_none_or(|(w, _)| worth > *w) {
@@ -182,14 +183,19 @@ fn better_written(
         let used = made.path.seconds / budget_s;
         if used <= USED[1] && made.plan.skipped.is_empty() {
             let is_as_long = used >= USED[0];
-            written.push((Worth::of(&view_of(machine, catalogue, made.plan)?), is_as_long, spec.name, text));
+            written.push((
+                Worth::of(&view_of(machine, catalogue, made.plan, noise_of(machine))?),
+                is_as_long,
+                spec.name,
+                text,
+            ));
         }
     }
     if written.is_empty() {
         return Ok(None);
     }
     let (chosen, _) = program::generate(machine, choice, &Options::default())?;
-    let of_choice = Worth::of(&view_of(machine, catalogue, chosen.plan)?);
+    let of_choice = Worth::of(&view_of(machine, catalogue, chosen.plan, noise_of(machine))?);
     written.retain(|(worth, is_as_long, ..)| {
         !of_choice.is_as_good_as(worth) && (*is_as_long || worth.is_as_good_as(&of_choice))
     });
@@ -259,19 +265,29 @@ fn prove(machine: &Machine, text: &str) -> Result<Generated> {
     Ok(program::generate(machine, &spec, &Options::default())?.0)
 }
 
-/// The touches of a pool as a plan sees them, the whole catalogue beside the model.
+/// What the touches of a pool tell, the whole catalogue beside the model.
 fn linearised(
     machine: &Machine,
     catalogue: &Catalogue,
     mounting: &Mounting,
     pool: &[Bundle],
     budget_s: f64,
-) -> Result<LinearisedPlan> {
-    view_of(machine, catalogue, as_plan(machine, mounting, pool, budget_s / 2.0, VisitOf::Manner))
+) -> Result<Tells> {
+    let noise = noise_of(machine);
+    let plan = as_plan(machine, mounting, pool, budget_s / 2.0, VisitOf::Manner);
+    let of_touches = view_of(machine, catalogue, plan, Noise { tau_mm: 0.0, ..noise })?;
+    Ok(Tells::of(&of_touches, noise.tau_mm))
+}
+
+fn noise_of(machine: &Machine) -> Noise {
+    Noise {
+        sigma_mm: mm_from_um(machine.probe.repeatability_um),
+        tau_mm: machine.rotary().map(|a| a.indexing_repeatability_mm.powi(2)).sum::<f64>().sqrt(),
+    }
 }
 
 /// What a plan sees, the whole catalogue beside the model.
-fn view_of(machine: &Machine, catalogue: &Catalogue, plan: Plan) -> Result<LinearisedPlan> {
+fn view_of(machine: &Machine, catalogue: &Catalogue, plan: Plan, noise: Noise) -> Result<LinearisedPlan> {
     let effects = default_effects(machine, &[&plan], false);
     let task = Task {
         machine,
@@ -280,10 +296,6 @@ fn view_of(machine: &Machine, catalogue: &Catalogue, plan: Plan) -> Result<Linea
         held: Vec::new(),
         reference: machine.reference.pivot,
         temperature: false,
-    };
-    let noise = Noise {
-        sigma_mm: mm_from_um(machine.probe.repeatability_um),
-        tau_mm: machine.rotary().map(|a| a.indexing_repeatability_mm.powi(2)).sum::<f64>().sqrt(),
     };
     LinearisedPlan::new(&task, &[Planned::new(plan)], &[], noise)
 }

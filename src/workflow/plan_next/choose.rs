@@ -1,6 +1,8 @@
 //! Which touches of which blocks: chosen, proven to be reachable, and what they will tell.
 
-use crate::design::bundle::{Bundle, Head, Manner, SWIVELS_DEG, VisitOf, as_plan, bundles, program_text, without};
+use crate::design::bundle::{
+    Bundle, Head, Manner, SWIVELS_DEG, VisitOf, as_plan, bundles, is_skipped, program_text, without,
+};
 use crate::design::choose_touches::{Design, Separation, where_all_have_values};
 use crate::design::questions::{Pair, Questions};
 use crate::design::{Known, LinearisedPlan, Noise, Planned, Room, Task};
@@ -255,7 +257,7 @@ impl<'a> Setting<'a> {
                 break;
             }
             if lost {
-                pool = without(&pool, &generated.plan.skipped);
+                (pool, _) = without(&pool, |_, b, face| is_skipped(b, face, &generated.plan.skipped));
             }
             scale = (scale / over * 0.97).clamp(0.1, 10.0);
         }
