@@ -223,9 +223,10 @@ impl Maker<'_> {
         tried.sort_by(f64::total_cmp);
         loop {
             let more = around(shape, &self.fit.data, &tried, best.0);
+            let before = best.1;
             best = try_also(&more, best);
             // of a number that changes smoothly there are always more steps between
-            if more.is_empty() || shape.between.is_none() {
+            if more.is_empty() || (shape.between.is_none() && best.1 < WORTH_A_CLOSER_LOOK * before) {
                 break;
             }
             tried.extend(more);
@@ -238,6 +239,9 @@ impl Maker<'_> {
         kept
     }
 }
+
+/// A number that explains so many times more than its neighbours is looked at more closely.
+const WORTH_A_CLOSER_LOOK: f64 = 1.01;
 
 /// Usual size of a parameter: 1 where it has none.
 fn typical(u: &Unknown) -> f64 {

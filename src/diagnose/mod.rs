@@ -233,7 +233,7 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         return Ok(answer);
     }
     let mut decision = decide::decide(&seen, &beside);
-    if let Some(pair) = pairs::both(&seen, &decision, &generics) {
+    if let Some(pair) = pairs::both(subject, &seen, &decision, &generics) {
         pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most);
         (seen.both, seen.given) = (Some(pair), true);
         (beside.shapes_win, beside.better) = (false, None);

@@ -1,7 +1,7 @@
 //! Two effects at once, before an effect of many parameters is named and before nothing is.
 
-use super::Examination;
 use super::decide::{Decision, Kind, LACK_OF_FIT, bears_out};
+use super::{Examination, Subject, with_effects};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, held_out};
 use crate::search::pattern_tests::Generics;
@@ -16,7 +16,7 @@ const CLEARLY: f64 = 10.0;
 
 /// The pair that is to be named in place of what the tests of single effects decide: together they explain all that no one does, no
 /// pattern says it with less, and held-out touches bear them out.
-pub(super) fn both(seen: &Examination, decision: &Decision, generics: &Generics) -> Option<Pair> {
+pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision, generics: &Generics) -> Option<Pair> {
     if decision.kind == Kind::TooFewTouches || decision.kind == Kind::Adequate {
         return None;
     }
@@ -44,12 +44,19 @@ pub(super) fn both(seen: &Examination, decision: &Decision, generics: &Generics)
     joint.columns_mut(columns[0].ncols(), columns[1].ncols()).copy_from(&columns[1]);
     let mut base = search.question.base.clone();
     base.extend(&joint, KEPT);
-    if lack_of_fit(&Question { base: &base, ..search.question }).p < LACK_OF_FIT {
+    // with shapes at the values that were tried; where that leaves too much, with all of their values free
+    let leaves_much = lack_of_fit(&Question { base: &base, ..search.question }).p < LACK_OF_FIT;
+    if leaves_much && !is_left_to_the_noise(subject, [pair.first, pair.second].map(|c| &*seen.named.effects[c].id)) {
         return None;
     }
     library.push("both", Origin::Catalogue, &joint);
     let held = held_out(search.question, &library, &seen.evidence.visits, Choice::Given(0));
     bears_out(&held).then_some(pair)
+}
+
+/// Does the noise explain what a fit with these effects leaves?
+fn is_left_to_the_noise(subject: Subject, effects: [&str; 2]) -> bool {
+    with_effects(subject, &effects).is_ok_and(|fit| fit.dof > 0 && fit.outcome.chi2_per_dof <= fit.noise.limit(fit.dof))
 }
 
 /// The groups with those of the pair in front.
