@@ -18,7 +18,7 @@ use crate::units::mm_from_um;
 use nalgebra::Vector3;
 
 /// Rounds of choosing, proving and leaving out what cannot be reached.
-const MOST_ROUNDS: usize = 6;
+const MOST_ROUNDS: usize = 5;
 
 /// The program uses at least this share of its time, at most this much more.
 const USED: [f64; 2] = [0.9, 1.02];
@@ -176,26 +176,26 @@ fn better_written(
     choice: &ProgramSpec,
     budget_s: f64,
 ) -> Result<Option<AutoProgram>> {
-    let mut written = Vec::new();
-    for (spec, text) in program::written_for(machine, &mounting.name)? {
-        // a mounting that was changed may no longer suit it
-        let Ok((made, _)) = program::generate(machine, &spec, &Options::default()) else { continue };
-        let used = made.path.seconds / budget_s;
-        if used <= USED[1] && made.plan.skipped.is_empty() {
-            let is_as_long = used >= USED[0];
-            written.push((
-                Worth::of(&view_of(machine, catalogue, made.plan, noise_of(machine))?),
-                is_as_long,
-                spec.name,
-                text,
-            ));
-        }
-    }
-    if written.is_empty() {
+    let suited = program::written_for(machine, &mounting.name)?;
+    if suited.is_empty() {
         return Ok(None);
     }
-    let (chosen, _) = program::generate(machine, choice, &Options::default())?;
-    let of_choice = Worth::of(&view_of(machine, catalogue, chosen.plan, noise_of(machine))?);
+    let worth_of = |plan: Plan| view_of(machine, catalogue, plan, noise_of(machine)).map(|view| Worth::of(&view));
+    let of_written = || -> Result<Vec<(Worth, bool, String, &str)>> {
+        let mut written = Vec::new();
+        for (spec, text) in suited {
+            // a mounting that was changed may no longer suit it
+            let Ok((made, _)) = program::generate(machine, &spec, &Options::default()) else { continue };
+            let used = made.path.seconds / budget_s;
+            if used <= USED[1] && made.plan.skipped.is_empty() {
+                written.push((worth_of(made.plan)?, used >= USED[0], spec.name, text));
+            }
+        }
+        Ok(written)
+    };
+    let of_choice = || worth_of(program::generate(machine, choice, &Options::default())?.0.plan);
+    let (written, of_choice) = rayon::join(of_written, of_choice);
+    let (mut written, of_choice) = (written?, of_choice?);
     written.retain(|(worth, is_as_long, ..)| {
         !of_choice.is_as_good_as(worth) && (*is_as_long || worth.is_as_good_as(&of_choice))
     });
