@@ -157,3 +157,29 @@ impl VisitNormals {
         self.visits.iter().flat_map(|v| v.squares.iter()).map(|s| self.variance(*s, tau_mm).ln()).sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn some_touches_scatter_as_if_the_others_were_never_made() {
+        let normals =
+            [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0], [0.8, 0.0, 0.6], [0.0, 0.6, 0.8]]
+                .map(Vector3::from);
+        let all = VisitNormals::new(&[0, 0, 0, 1, 1, 2], &normals, 0.001);
+        // the last visit loses its only touch, the others keep some
+        let kept = all.only(&[0, 2, 4]);
+        let made = VisitNormals::new(&[0, 0, 1], &[normals[0], normals[2], normals[4]], 0.001);
+        assert!((kept.ln_det(0.0005) - made.ln_det(0.0005)).abs() < 1e-12);
+        let whitened = |visits: &VisitNormals| {
+            let mut column = DMatrix::from_column_slice(3, 1, &[1.0, 2.0, 3.0]);
+            visits.change(0.0, 0.0005).apply(&mut column);
+            column
+        };
+        assert!((whitened(&kept) - whitened(&made)).amax() < 1e-12);
+        // by hand: a touch alone along its normal, with half its standard deviation as scatter
+        let lonely = whitened(&kept)[2] * (1.0f64 + 0.25).sqrt();
+        assert!((lonely - 3.0).abs() < 1e-12, "{lonely}");
+    }
+}

@@ -74,17 +74,17 @@ pub fn groups(d: &Diagnosis) -> Vec<Vec<String>> {
 }
 
 /// Readings without noise, less what the errorless fit leaves, µm.
-fn gaps(bench: &Bench, acts: &[&Act], more: &[String]) -> (DVector<f64>, Fit) {
+fn gaps(bench: &Bench, acts: &[&Act]) -> (DVector<f64>, Fit) {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
-    let (fit, _) = fit(bench, &bench.measure(acts, 0.0, 0.0, true, &mut rng), more);
+    let (fit, _) = fit(bench, &bench.measure(acts, 0.0, 0.0, true, &mut rng), &[]);
     let free: DVector<f64> = DVector::zeros(fit.free.len());
     (fit.with_touches(0.0, |t| DVector::from_vec(t.gaps(&free))) * 1000.0, fit)
 }
 
-/// What a fault of size 1 adds to the readings, µm, and what of it the base model with more effects cannot follow.
-fn trace(bench: &Bench, base: &Act, fault: &Fault, more: &[String]) -> Option<(DVector<f64>, DVector<f64>)> {
-    let (without, fit) = gaps(bench, &[base], more);
-    let (with, _) = gaps(bench, &[base, &*fault.at_size(1.0)], more);
+/// What a fault of size 1 adds to the readings, µm, and what of it the base model cannot follow.
+fn trace(bench: &Bench, base: &Act, fault: &Fault) -> Option<(DVector<f64>, DVector<f64>)> {
+    let (without, fit) = gaps(bench, &[base]);
+    let (with, _) = gaps(bench, &[base, &*fault.at_size(1.0)]);
     if with.len() != without.len() {
         return None;
     }
@@ -97,18 +97,18 @@ fn trace(bench: &Bench, base: &Act, fault: &Fault, more: &[String]) -> Option<(D
 
 /// The size of a fault, and its noncentrality at 1 µm of noise; `None` where the base model takes all of it.
 pub fn sized(bench: &Bench, base: &Act, fault: &Fault, conditions: Conditions, peak_um: f64) -> Option<(f64, f64)> {
-    let (difference, left) = trace(bench, base, fault, &[])?;
-    let seen = left.norm_squared();
+    let (difference, left) = trace(bench, base, fault)?;
+    size_of(&difference, left.norm_squared(), conditions, peak_um)
+}
+
+fn size_of(difference: &DVector<f64>, seen: f64, conditions: Conditions, peak_um: f64) -> Option<(f64, f64)> {
     let size = match conditions.noncentrality {
         Some(wanted) => (wanted / seen).sqrt(),
         None => peak_um / difference.amax(),
     };
     // what must be made huge to be seen is no fault of a machine
-    (size.is_finite() && size < 40.0 && size * size * seen >= LEAST).then_some((size, size * size * seen))
+    (size.is_finite() && size < 40.0 && size * size * seen >= 25.0).then_some((size, size * size * seen))
 }
-
-/// The least noncentrality of a fault that is planted.
-const LEAST: f64 = 25.0;
 
 /// What came of two faults at once.
 #[derive(Debug, Clone)]
@@ -141,6 +141,8 @@ pub fn pairs(benches: &[Bench], count: usize, seed: u64) -> Vec<Pair> {
     out
 }
 
+/// Names that a step may have: a pair that hides each other is one question and does not count.
+const ONE_QUESTION: f64 = 0.95;
 const MOST_STEPS: usize = 4;
 
 fn pair(bench: &Bench, rng: &mut ChaCha8Rng) -> Option<Pair> {
@@ -148,26 +150,21 @@ fn pair(bench: &Bench, rng: &mut ChaCha8Rng) -> Option<Pair> {
     let base = bench.ordinary(rng);
     let mut acts: Vec<Box<Act>> = Vec::new();
     let mut faults: Vec<Fault> = Vec::new();
-    let mut sizes: Vec<f64> = Vec::new();
+    let mut traces: Vec<DVector<f64>> = Vec::new();
     while faults.len() < 2 {
         let fault = super::faults::draw(bench, rng);
         let peak_um = rng.random_range(3.0..10.0);
         if faults.iter().any(|f| f.expects.iter().any(|id| fault.expects.contains(id))) {
             continue;
         }
-        let Some((size, _)) = sized(bench, &base, &fault, plain, peak_um) else { continue };
+        let Some((difference, left)) = trace(bench, &base, &fault) else { continue };
+        let Some((size, _)) = size_of(&difference, left.norm_squared(), plain, peak_um) else { continue };
         acts.push(fault.at_size(size));
-        sizes.push(size);
+        traces.push(left.normalize());
         faults.push(fault);
     }
-    // each can still be seen when a right name of the other one is in the model: else they are one question
-    for (one, other) in [(0, 1), (1, 0)] {
-        for name in &faults[other].expects {
-            let (_, left) = trace(bench, &base, &faults[one], std::slice::from_ref(name))?;
-            if sizes[one].powi(2) * left.norm_squared() < LEAST {
-                return None;
-            }
-        }
+    if traces[0].dot(&traces[1]).abs() >= ONE_QUESTION {
+        return None;
     }
     let all: Vec<&Act> = std::iter::once(&*base).chain(acts.iter().map(|act| &**act)).collect();
     let touches = bench.measure(&all, 1.0, 0.0, true, rng);
