@@ -121,6 +121,37 @@ async function undoAndRedo(t) {
   equal(seen.errors, [], "errors in the console");
 }
 
+/** Clicks in quick succession are all done, and the evidence that arrives under a pointer that is down swallows none. */
+async function noClickIsLost(t) {
+  const { folder, page, seen } = await opened(t, "clicks");
+  const wanted = ["scale-x", "scale-y", "scale-z"];
+  await page.fill("#find", "scale-");
+  for (const effect of wanted) await page.waitForSelector(`#candidates [data-switch=${effect}]`);
+  await page.evaluate((all) => { for (const effect of all) document.querySelector(`[data-switch=${effect}]`).click(); }, wanted);
+  for (const effect of wanted) await page.waitForSelector(`#in-model [data-switch=${effect}][aria-checked=true]`);
+  for (const effect of wanted) holds(text(folder).includes(`"${effect}"`), `${effect} is not in the study`);
+
+  // evidence arrives while the pointer is down on a switch
+  let goOn = null;
+  const pressed = new Promise((done) => { goOn = done; });
+  let held = 0;
+  await page.route("**/api/evidence", async (route) => { held += 1; await pressed; await route.continue(); });
+  await page.reload();
+  await page.waitForSelector("body[data-version]");
+  await page.fill("#find", "squareness-");
+  const { x, y, width, height } = await page.locator("#candidates [data-switch=squareness-xy]").boundingBox();
+  await page.mouse.move(x + width / 2, y + height / 2);
+  await page.mouse.down();
+  holds(held > 0, "no evidence was asked for");
+  const answered = page.waitForResponse("**/api/evidence");
+  goOn();
+  await (await answered).finished();
+  await page.waitForTimeout(100);
+  await page.mouse.up();
+  await page.waitForSelector("#in-model [data-switch=squareness-xy][aria-checked=true]", { state: "attached" });
+  equal(seen.errors, [], "errors in the console");
+}
+
 async function touchesAreTakenOut(t) {
   const { folder, page, seen } = await opened(t, "mask");
   const used = await page.textContent("#used");
@@ -506,6 +537,7 @@ async function withoutToken(t) {
 export const workbenchCases = [
   ["workbench_whole_loop", wholeLoop],
   ["workbench_undo_and_redo", undoAndRedo],
+  ["workbench_no_click_is_lost", noClickIsLost],
   ["workbench_touches_are_taken_out", touchesAreTakenOut],
   ["workbench_formula_box", formulaBox],
   ["workbench_formula_with_a_time_constant", formulaWithATimeConstant],

@@ -22,6 +22,23 @@ export function soonest(name, job) {
 /** Forgets a job. */
 export const never = (name) => jobs.delete(name);
 
+let release = null;
+let up = Promise.resolve();
+
+/** When no click is under way: what is drawn again under a pointer that is down swallows its click. */
+export const released = () => up;
+
+addEventListener("pointerdown", () => {
+  if (release) return;
+  up = new Promise((done) => {
+    release = () => { release = null; done(); };
+    // who holds the pointer down for longer does not click
+    setTimeout(release, 500);
+  });
+}, true);
+// the click itself comes right after the pointer goes up
+addEventListener("pointerup", () => setTimeout(() => release?.()), true);
+
 function wake() {
   if (waiting) return;
   waiting = true;
@@ -36,7 +53,8 @@ function wake() {
   setTimeout(begin, 500);
 }
 
-function turn() {
+async function turn() {
+  await released();
   const [name, job] = jobs.entries().next().value ?? [];
   jobs.delete(name);
   try {

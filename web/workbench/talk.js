@@ -2,7 +2,7 @@
 
 import { ask, headers } from "./ask.js";
 import { listenTogether } from "./events.js";
-import { later, soonest } from "./later.js";
+import { later, released, soonest } from "./later.js";
 
 export const state = { inputs: null, live: null, behind: null, preview: null };
 
@@ -12,6 +12,7 @@ const tell = (what, ...words) => listeners[what].forEach((listener) => listener(
 
 /** Puts a new state in the place of the old one; an older one that arrives late is dropped. */
 async function put(live) {
+  await released();
   if (state.live && live.version < state.live.version) return;
   if (!state.inputs || state.inputs.inputs !== live.inputs) {
     const inputs = await ask("/api/inputs");
@@ -32,6 +33,7 @@ export async function refresh() {
 
 async function refreshBehind() {
   const behind = await ask("/api/evidence");
+  await released();
   if (!state.live || behind.version !== state.live.version) return;
   state.behind = behind;
   tell("behind", behind);
@@ -42,10 +44,17 @@ export function trouble(error) {
 }
 
 let busy = false;
+let last = Promise.resolve();
 
-/** Makes a step: one at a time, each asked of the state that is shown. `first` is done before it is asked for. */
-export async function step(what, first = null) {
-  if (busy || !state.live) return false;
+/** Makes a step: one at a time, each asked of the state that is shown; one that is asked for meanwhile waits for its turn,
+ *  so that no click is lost. `first` is done before it is asked for. */
+export function step(what, first = null) {
+  last = last.then(() => make(what, first));
+  return last;
+}
+
+async function make(what, first) {
+  if (!state.live) return false;
   busy = true;
   const began = performance.now();
   try {
