@@ -3,18 +3,26 @@
 //! What a word, a variable or a G number *means* is not here: that is the dialect's (`run::Dialect`).
 
 use super::run::Fault;
+use internment::Intern;
 use std::collections::{BTreeMap, HashMap};
 use std::hash::{BuildHasherDefault, Hasher};
 use std::ops::Range;
 use std::sync::{Arc, LazyLock};
 
 /// A variable of the control.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Var {
     /// `#5061`, `Q115`
     Number(u32),
     /// `#<_axiscal_from>`, `$AA_MM[X]`, `AXC_LINE`
-    Name(Arc<str>),
+    Name(Intern<str>),
+}
+
+impl Var {
+    /// A variable that has a name. Each name is kept once, for as long as the program runs.
+    pub fn named(name: &str) -> Self {
+        Self::Name(Intern::from(name))
+    }
 }
 
 impl std::fmt::Display for Var {
@@ -324,18 +332,11 @@ impl<K: Ord> Links<K> {
 pub type Values = HashMap<Var, f64, BuildHasherDefault<VarHasher>>;
 
 /// The variable in which LinuxCNC keeps what a subroutine gives back.
-pub static VALUE: LazyLock<Var> = LazyLock::new(|| Var::Name("_value".into()));
+pub static VALUE: LazyLock<Var> = LazyLock::new(|| Var::named("_value"));
 
-/// A fast hash of a variable: names are short, and nobody chooses them to collide.
+/// A fast hash of a variable: of its number, or of the place at which its name is kept.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct VarHasher(u64);
-
-impl VarHasher {
-    fn mix(&mut self, word: u64) {
-        const PRIME: u64 = 0x9E37_79B9_7F4A_7C15;
-        self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(PRIME);
-    }
-}
 
 impl Hasher for VarHasher {
     fn finish(&self) -> u64 {
@@ -343,25 +344,20 @@ impl Hasher for VarHasher {
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        // the ends of a longer name tell it from others of the program
-        if let (Some(first), Some(last)) = (bytes.first_chunk::<8>(), bytes.last_chunk::<8>()) {
-            self.mix(u64::from_le_bytes(*first));
-            self.mix(u64::from_le_bytes(*last) ^ bytes.len() as u64);
-            return;
-        }
-        for chunk in bytes.chunks(8) {
-            let mut word = [0; 8];
-            word.iter_mut().zip(chunk).for_each(|(slot, byte)| *slot = *byte);
-            self.mix(u64::from_le_bytes(word));
-        }
+        bytes.iter().for_each(|byte| self.write_u64(u64::from(*byte)));
+    }
+
+    fn write_u64(&mut self, word: u64) {
+        const PRIME: u64 = 0x9E37_79B9_7F4A_7C15;
+        self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(PRIME);
     }
 
     fn write_u32(&mut self, word: u32) {
-        self.mix(u64::from(word));
+        self.write_u64(u64::from(word));
     }
 
     fn write_usize(&mut self, word: usize) {
-        self.mix(word as u64);
+        self.write_u64(word as u64);
     }
 }
 

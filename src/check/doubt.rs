@@ -112,7 +112,7 @@ impl<D: Dialect> Run<'_, D> {
         let depth = self.depth_of(var);
         match doubt {
             Some(doubt) => {
-                self.doubts.values.entry(depth).or_default().insert(var.clone(), doubt);
+                self.doubts.values.entry(depth).or_default().insert(*var, doubt);
             }
             None => {
                 self.doubts.values.get_mut(&depth).map(|at| at.remove(var));
@@ -179,7 +179,7 @@ impl<D: Dialect> Run<'_, D> {
                 break;
             }
             if let Instruction::Set(var, _) = &statement.what {
-                written.insert(var.clone(), (run.bits(var), run.held_doubt(var)));
+                written.insert(*var, (run.bits(var), run.held_doubt(var)));
             }
             states.push(Computed { next: run.next, written: written.clone() });
         }

@@ -346,11 +346,13 @@ impl<'p, D: Dialect> Run<'p, D> {
                 if self.returns.len() >= DEEPEST {
                     return Err("subroutines call each other more than ten deep".to_owned());
                 }
-                let given = |(var, expr): &(Var, Expr)| Ok((var.clone(), self.value(expr)?, self.doubt(expr)));
-                let given = gives.iter().map(given).collect::<Result<Vec<_>, String>>()?;
+                let mut given = Vec::with_capacity(gives.len());
+                for (var, expr) in gives {
+                    given.push((*var, self.value(expr)?, self.doubt(expr)));
+                }
                 for (var, text) in texts {
                     let text = self.text(text)?;
-                    self.texts.insert(var.clone(), text);
+                    self.texts.insert(*var, text);
                 }
                 let outer = self.returns.last().and_then(|back| back.step.clone());
                 let step = outer.or_else(|| is_step.then(|| statement.at.clone()));
@@ -390,7 +392,7 @@ impl<'p, D: Dialect> Run<'p, D> {
                 if text.chars().count() > *most {
                     return Err(format!("{var} holds {most} characters, the text has {}", text.chars().count()));
                 }
-                self.texts.insert(var.clone(), text);
+                self.texts.insert(*var, text);
             }
             Instruction::LogWrite { error, name, text } => self.log_write(error, name, text)?,
             Instruction::LogDelete { error, name } => {

@@ -15,7 +15,7 @@ use crate::program::plan::{Plan, Proof};
 use crate::program::{self, Generated, Options, ProgramSpec, SkippedGroup, pose_says};
 use crate::report::fit::{number, table};
 use crate::workflow::auto_program::{AutoProgram, auto_program};
-use crate::workflow::generate::{ForControl, generate, load_program};
+use crate::workflow::generate::{ForControl, for_control, generate, load_program};
 use crate::workflow::{Environment, load_controller, machines_file};
 use comfy_table::Cell;
 use serde_json::json;
@@ -81,7 +81,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     if let Some(mounted) = &mounted {
         machine = mounted.machine.clone();
     }
-    let auto = (args.program == AUTO).then(|| choose_touches(&machine, mounted.as_ref(), args)).transpose()?;
+    let mut auto = (args.program == AUTO).then(|| choose_touches(&machine, mounted.as_ref(), args)).transpose()?;
     let mut spec = match &auto {
         Some(auto) => auto.spec.clone(),
         None => load_program(&args.program, &machine, io)?,
@@ -108,7 +108,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         keep_other_machines(&args.out.join(MACHINES))?;
     }
     let options = Options { strict: args.strict, tcp: args.tcp };
-    let ForControl { mut generated, nc, proof, seconds } = generate(&machine, &spec, &post, &options, &Summarised(io))?;
+    // a choice was made with the usual options
+    let made = auto.as_mut().and_then(|auto| auto.made.take()).filter(|_| options == Options::default());
+    let written = match made {
+        Some(made) => for_control(&machine, &spec, made, &post, &Summarised(io)),
+        None => generate(&machine, &spec, &post, &options, &Summarised(io)),
+    };
+    let ForControl { mut generated, nc, proof, seconds } = written?;
 
     let mut files: Vec<(PathBuf, &str)> =
         nc.files(&spec.name).into_iter().map(|(name, text)| (args.out.join(name), text)).collect();

@@ -44,7 +44,7 @@ use crate::machine::Machine;
 use plan::{ControllerFrame, Plan};
 
 /// How a program is generated.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Options {
     /// Refuse the program when a single touch cannot be reached, instead of leaving it out.
     pub strict: bool,

@@ -8,7 +8,7 @@ use crate::design::bundle::{
 };
 use crate::design::worth::Worth;
 use crate::design::{LinearisedPlan, Noise, Planned, Task};
-use crate::diag::{Failure, Result, source};
+use crate::diag::{Failure, Findings, Result, source};
 use crate::fit::effects_of;
 use crate::machine::{Machine, Mounting};
 use crate::model::catalogue::Catalogue;
@@ -46,7 +46,12 @@ pub struct AutoProgram {
     pub better: Option<BetterPlace>,
     /// The built-in program that was taken.
     pub taken: Option<Taken>,
+    /// Plan and path, where they were made on the way.
+    pub made: Option<Made>,
 }
+
+/// Plan and path of a program, and what is to be said of them.
+type Made = (Generated, Findings);
 
 /// A built-in program that measures better than the touches that would be chosen.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,7 +98,7 @@ pub fn auto_program(
     // what was found with one stylus is not found for another
     pool.retain(|bundle| by_eye_mm.is_none() || bundle.manner.stylus.is_none());
     let mut scale = 1.0;
-    let mut best: Option<(f64, String)> = None;
+    let mut best: Option<(f64, String, Option<Made>)> = None;
     let mut worst = f64::INFINITY;
     let mut why: Option<Failure> = None;
     let mut known: Option<Tells> = None;
@@ -111,7 +116,8 @@ pub fn auto_program(
         }
         worst = worst.min(choice.worst);
         let mut text = write(&pool, &choice);
-        let made = match prove(machine, &text) {
+        let mut whole = None;
+        let (made, findings) = match prove(machine, &text) {
             Ok(made) => made,
             Err(failure) => {
                 // nothing of it can be reached: what was chosen is no choice
@@ -140,10 +146,11 @@ pub fn auto_program(
             pool = left;
         } else {
             known = Some(tells);
+            whole = Some((made, findings));
         }
         let worth = used - 2.0 * lost;
-        if used <= USED[1] && best.as_ref().is_none_or(|(w, _)| worth > *w) {
-            best = Some((worth, text));
+        if used <= USED[1] && best.as_ref().is_none_or(|(w, ..)| worth > *w) {
+            best = Some((worth, text, whole));
             if worth >= USED[0] {
                 break;
             }
@@ -159,27 +166,32 @@ pub fn auto_program(
                 .help("more minutes (--minutes), or another place for the artefact")
         })
     };
-    let (_, text) = best.ok_or_else(nothing)?;
+    let (_, text, made) = best.ok_or_else(nothing)?;
     let (spec, _) = program::load(&source("auto.toml", text.clone()))?;
-    if let (None, Some(written)) = (by_eye_mm, better_written(machine, catalogue, mounting, &spec, budget_s)?) {
-        return Ok(written);
-    }
+    // what cannot be reached was left out since: it is made anew
+    let made = || made.map_or_else(|| program::generate(machine, &spec, &Options::default()), Ok);
+    let suited = if by_eye_mm.is_none() { program::written_for(machine, &mounting.name)? } else { Vec::new() };
+    let made = if suited.is_empty() {
+        made()?
+    } else {
+        let (made, written) = better_written(machine, catalogue, suited, made, budget_s)?;
+        if let Some(written) = written {
+            return Ok(written);
+        }
+        made
+    };
     let better = if worst > POOR { better_place(machine, catalogue, mounting, budget_s, worst)? } else { None };
-    Ok(AutoProgram { text, spec, better, taken: None })
+    Ok(AutoProgram { text, spec, better, taken: None, made: Some(made) })
 }
 
-/// The built-in program for this machine and mounting that a choice does not reach: of about the same time, or better in everything.
+/// The choice, and the built-in program that it does not reach: of about the same time, or better in everything.
 fn better_written(
     machine: &Machine,
     catalogue: &Catalogue,
-    mounting: &Mounting,
-    choice: &ProgramSpec,
+    suited: Vec<(ProgramSpec, &'static str)>,
+    choice: impl FnOnce() -> Result<Made> + Send,
     budget_s: f64,
-) -> Result<Option<AutoProgram>> {
-    let suited = program::written_for(machine, &mounting.name)?;
-    if suited.is_empty() {
-        return Ok(None);
-    }
+) -> Result<(Made, Option<AutoProgram>)> {
     let worth_of = |plan: Plan| view_of(machine, catalogue, plan, noise_of(machine)).map(|view| Worth::of(&view));
     let of_written = || -> Result<Vec<(Worth, bool, String, &str)>> {
         let mut written = Vec::new();
@@ -193,18 +205,23 @@ fn better_written(
         }
         Ok(written)
     };
-    let of_choice = || worth_of(program::generate(machine, choice, &Options::default())?.0.plan);
+    let of_choice = || -> Result<(Made, Worth)> {
+        let made = choice()?;
+        let worth = worth_of(made.0.plan.clone())?;
+        Ok((made, worth))
+    };
     let (written, of_choice) = rayon::join(of_written, of_choice);
-    let (mut written, of_choice) = (written?, of_choice?);
+    let (mut written, (made, of_choice)) = (written?, of_choice?);
     written.retain(|(worth, is_as_long, ..)| {
         !of_choice.is_as_good_as(worth) && (*is_as_long || worth.is_as_good_as(&of_choice))
     });
     let Some((worth, _, name, text)) = written.into_iter().min_by(|a, b| a.0.worst.total_cmp(&b.0.worst)) else {
-        return Ok(None);
+        return Ok((made, None));
     };
     let text = renamed(text, &name)?;
     let (spec, _) = program::load(&source("auto.toml", text.clone()))?;
-    Ok(Some(AutoProgram { text, spec, better: None, taken: Some(Taken { program: name, worth, of_choice }) }))
+    let taken = Some(Taken { program: name, worth, of_choice });
+    Ok((made, Some(AutoProgram { text, spec, better: None, taken, made: None })))
 }
 
 /// The text of a built-in program as a file of its own.
@@ -260,9 +277,9 @@ fn narrow_hole(machine: &Machine, mounting: &Mounting) -> Option<Failure> {
     })
 }
 
-fn prove(machine: &Machine, text: &str) -> Result<Generated> {
+fn prove(machine: &Machine, text: &str) -> Result<Made> {
     let (spec, _) = program::load(&source("auto.toml", text.to_owned()))?;
-    Ok(program::generate(machine, &spec, &Options::default())?.0)
+    program::generate(machine, &spec, &Options::default())
 }
 
 /// What the touches of a pool tell, the whole catalogue beside the model.

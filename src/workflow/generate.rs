@@ -3,7 +3,7 @@
 use super::Environment;
 use super::new::default_effects;
 use crate::check::{self, Against};
-use crate::diag::{Failure, Finding, Result, Severity, source};
+use crate::diag::{Failure, Finding, Findings, Result, Severity, source};
 use crate::fit;
 use crate::log::{Status, Touch};
 use crate::machine::Machine;
@@ -46,7 +46,20 @@ pub fn generate(
         return Err(Failure::new("generate::no_transformation", format!("{} cannot run under a transformation of LinuxCNC's own: {why}", machine.name))
             .help("generate without --tcp: under the kinematics component that `export` writes, coordinates stay axis positions. Is it another version of LinuxCNC, name it under [settings] of a postprocessor file of your own"));
     }
-    let (mut generated, findings) = program::generate(machine, spec, options)?;
+    for_control(machine, spec, program::generate(machine, spec, options)?, post, env)
+}
+
+/// Writes a program whose plan and path are made for a control, and proves it.
+///
+/// # Errors
+/// When the program cannot be written for this control, or not be proven.
+pub fn for_control(
+    machine: &Machine,
+    spec: &ProgramSpec,
+    (mut generated, findings): (Generated, Findings),
+    post: &Postprocessor,
+    env: &dyn Environment,
+) -> Result<ForControl> {
     if !generated.plan.skipped.is_empty() {
         let lost = lost_parameters(machine, spec, &generated.plan)?;
         if !lost.is_empty() {

@@ -357,7 +357,7 @@ impl Dialect for Heidenhain {
     fn write(&mut self, var: &Var, value: f64, _vm: &Vm) -> Result<(), String> {
         match var {
             Var::Number(n) if OWN.contains(n) => {
-                self.own.insert(var.clone(), value);
+                self.own.insert(*var, value);
                 Ok(())
             }
             Var::Number(n) => Err(format!("Q{n} is not the program's own: Q1600 to Q1999 are")),

@@ -163,5 +163,5 @@ fn written_line(scan: &mut Scan<'_>) -> std::result::Result<Text, Fault> {
 pub fn string(scan: &mut Scan<'_>) -> std::result::Result<Var, Fault> {
     scan.need("QS", "a QS parameter")?;
     let number = scan.whole("the number of the QS parameter")?;
-    Ok(Var::Name(Arc::from(format!("QS{number}"))))
+    Ok(Var::named(&format!("QS{number}")))
 }

@@ -378,7 +378,7 @@ impl<'a> Reader<'a> {
             return Err(Fault { at: place, says: format!("ID{id} NR{nr} IDX{index} is not known to axiscal") });
         }
         let several = if id == 210 { format!(" NR{nr}") } else { String::new() };
-        let data = Var::Name(Arc::from(format!("ID{id}{several} IDX{index}")));
+        let data = Var::named(&format!("ID{id}{several} IDX{index}"));
         self.code.push(at, Instruction::Set(var, Expr::Var(data)));
         Ok(())
     }

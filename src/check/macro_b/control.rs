@@ -534,10 +534,10 @@ impl Dialect for MacroB {
             }
             Var::Number(3004) => self.holds = value,
             Var::Number(1..=33) => {
-                self.own.last_mut().map(|own| own.insert(var.clone(), value));
+                self.own.last_mut().map(|own| own.insert(*var, value));
             }
             Var::Number(n) if self.builder.common.contains(n) => {
-                self.common.insert(var.clone(), value);
+                self.common.insert(*var, value);
             }
             _ => return Err(format!("{var} is not the program's own: only #1 to #33 are")),
         }

@@ -19,6 +19,9 @@ use std::collections::{BTreeMap, HashMap};
 /// How many coordinate systems there are: G54 … G59.3.
 const SYSTEMS: usize = 9;
 
+/// Variables of a subroutine that are made room for when it begins.
+const ARGUMENTS: usize = 14;
+
 /// The modes that M73 keeps.
 #[derive(Debug, Clone, PartialEq)]
 struct Modes {
@@ -457,20 +460,20 @@ impl Dialect for Ngc {
                 }
             }
             Var::Number(n) if (1..=30).contains(n) => {
-                self.locals.last_mut().map(|l| l.insert(var.clone(), value));
+                self.locals.last_mut().map(|l| l.insert(*var, value));
             }
             Var::Number(n) if (31..5000).contains(n) => {
-                self.globals.insert(var.clone(), value);
+                self.globals.insert(*var, value);
             }
             Var::Number(_) => return Err(format!("{var} cannot be written")),
             Var::Name(name) if name.starts_with('_') => {
-                if name.as_ref() == "_value" || READ_ONLY.contains(&name.as_ref()) {
+                if &**name == "_value" || READ_ONLY.contains(&&**name) {
                     return Err(format!("#<{name}> is the control's own and cannot be written"));
                 }
-                self.globals.insert(var.clone(), value);
+                self.globals.insert(*var, value);
             }
             Var::Name(_) => {
-                self.locals.last_mut().map(|l| l.insert(var.clone(), value));
+                self.locals.last_mut().map(|l| l.insert(*var, value));
             }
         }
         Ok(())
@@ -485,7 +488,8 @@ impl Dialect for Ngc {
 
     fn entered(&mut self) {
         self.kept.push(None);
-        self.locals.push(Values::default());
+        // room for what a subroutine is given
+        self.locals.push(Values::with_capacity_and_hasher(ARGUMENTS, Default::default()));
     }
 
     fn left(&mut self, value: Option<f64>, _vm: &Vm) {
@@ -493,7 +497,7 @@ impl Dialect for Ngc {
         if let Some(Some(kept)) = self.kept.pop() {
             self.restore(kept);
         }
-        self.globals.insert(VALUE.clone(), value.unwrap_or(0.0));
+        self.globals.insert(*VALUE, value.unwrap_or(0.0));
     }
 
     fn settings(&self) -> BTreeMap<String, String> {

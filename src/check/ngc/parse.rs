@@ -15,7 +15,6 @@ use nom::multi::many0;
 use nom::sequence::{delimited, preceded};
 use nom::{IResult, Parser};
 use std::ops::Range;
-use std::sync::Arc;
 
 /// The letters that a block may hold.
 const ADDRESSES: [&str; 16] = ["G", "M", "X", "Y", "Z", "A", "B", "C", "F", "S", "P", "L", "R", "E", "D", "Q"];
@@ -318,7 +317,7 @@ fn bracketed_name(input: &str) -> IResult<&str, &str> {
 
 /// What follows `#`.
 pub(super) fn parameter(input: &str) -> IResult<&str, Expr> {
-    let name = bracketed_name.map(|n: &str| Expr::Var(Var::Name(Arc::from(n.to_ascii_lowercase()))));
+    let name = bracketed_name.map(|n: &str| Expr::Var(Var::named(&n.to_ascii_lowercase())));
     let plain = digit1.map(|d: &str| d.parse().map_or(Expr::Number(f64::NAN), |n| Expr::Var(Var::Number(n))));
     let computed = bracketed.map(|e| Expr::Indirect(Box::new(e)));
     alt((name, plain, computed)).parse(input)

@@ -45,7 +45,7 @@ impl Program {
         };
         let switch = |var: Var| set_at(&code, &var).map(|at| (var, at));
         let var = variable(&rule.from);
-        let from = switch(var.clone());
+        let from = switch(var);
         let dry_run = rule.dry_run.as_deref().map(variable).and_then(switch);
         let mut highest = 1.0_f64;
         for statement in &code.statements {
@@ -191,7 +191,7 @@ impl Program {
         let own = |(switch, value): (&Option<(Var, usize)>, f64)| {
             let (var, at) = switch.as_ref()?;
             let statement = self.code.statements.get(*at)?;
-            let what = Instruction::Set(var.clone(), Expr::Number(value));
+            let what = Instruction::Set(*var, Expr::Number(value));
             Some((*at, Arc::new(Statement { what, at: statement.at.clone() })))
         };
         [(&self.from, f64::from(setup)), (&self.dry_run, height)].into_iter().filter_map(own).collect()
@@ -207,7 +207,7 @@ fn set_at(code: &Code, var: &Var) -> Option<usize> {
 fn variable(written: &str) -> Var {
     let bare = written.trim_start_matches('#').trim_matches(['<', '>']);
     let digits = bare.strip_prefix('Q').unwrap_or(bare);
-    digits.parse().map_or_else(|_| Var::Name(Arc::from(bare)), Var::Number)
+    digits.parse().map_or_else(|_| Var::named(bare), Var::Number)
 }
 
 /// The numbers with which a condition compares a variable.

@@ -379,7 +379,7 @@ impl Dialect for Sinumerik {
             modulo,
             origin: machine.origin.position(),
             found_in: ["found_x", "found_y", "found_z", "found_off", "found_room"]
-                .map(|name| Var::Name(Arc::from(setting(name).trim())))
+                .map(|name| Var::named(setting(name).trim()))
                 .into(),
             inch: awkward,
             incremental: awkward,
@@ -545,10 +545,8 @@ impl Dialect for Sinumerik {
 
     fn write(&mut self, var: &Var, value: f64, vm: &Vm) -> Result<(), String> {
         match var {
-            Var::Name(name) if name.starts_with("$AC_TIMER[") => {
-                self.timers.insert(var.clone(), vm.clock_s(TIMER_S) - value)
-            }
-            Var::Name(name) if !name.starts_with('$') => self.own.insert(var.clone(), value),
+            Var::Name(name) if name.starts_with("$AC_TIMER[") => self.timers.insert(*var, vm.clock_s(TIMER_S) - value),
+            Var::Name(name) if !name.starts_with('$') => self.own.insert(*var, value),
             _ => return Err(format!("{var} cannot be written")),
         };
         Ok(())

@@ -78,7 +78,7 @@ impl Names {
     /// A variable of the program's own, or an R parameter, that holds a number.
     pub fn number(&self, name: &str) -> Option<Var> {
         let own = matches!(self.types.get(name), Some(Type::Int | Type::Real));
-        (own || is_r(name)).then(|| Var::Name(Arc::from(name)))
+        (own || is_r(name)).then(|| Var::named(name))
     }
 
     /// A system variable: `$AA_MM[X]` by the letter of the axis, `$AC_MEA[1]`.
@@ -88,7 +88,7 @@ impl Names {
             return self.frame(input, after);
         }
         if CLOCK.contains(&name) {
-            return Ok((after, Var::Name(Arc::from(name))));
+            return Ok((after, Var::named(name)));
         }
         let (after, index) = delimited(
             char('['),
@@ -105,7 +105,7 @@ impl Names {
             None
         };
         match index {
-            Some(index) => Ok((after, Var::Name(Arc::from(format!("{name}[{index}]"))))),
+            Some(index) => Ok((after, Var::named(&format!("{name}[{index}]")))),
             None => refuse(input),
         }
     }
@@ -116,7 +116,7 @@ impl Names {
         let (after, (axis, _, component)) =
             delimited(char('['), (identifier, char(','), component), char(']')).parse(after).map_err(to_failure)?;
         match self.axis(axis).filter(|a| !a.is_rotary()) {
-            Some(axis) => Ok((after, Var::Name(Arc::from(format!("{FRAME}[{},{component}]", axis.letter()))))),
+            Some(axis) => Ok((after, Var::named(&format!("{FRAME}[{},{component}]", axis.letter())))),
             None => refuse(input),
         }
     }
@@ -222,7 +222,7 @@ impl Names {
         if let Ok((rest, name)) = identifier(input)
             && matches!(self.types.get(name), Some(Type::Text(_)))
         {
-            return Ok((rest, vec![Piece::Held(Var::Name(Arc::from(name)))]));
+            return Ok((rest, vec![Piece::Held(Var::named(name))]));
         }
         let (rest, value) = self.level(input, 0)?;
         let whole = self.is_whole(&value);
@@ -236,7 +236,7 @@ impl Names {
     fn is_whole(&self, value: &Expr) -> bool {
         match value {
             Expr::Number(x) => x.fract() == 0.0,
-            Expr::Var(Var::Name(name)) => self.types.get(name) == Some(&Type::Int),
+            Expr::Var(Var::Name(name)) => self.types.get(&**name) == Some(&Type::Int),
             _ => false,
         }
     }

@@ -180,7 +180,7 @@ impl Reader {
                 let own = self.names.types.get(name).copied();
                 let r = self.names.number(name).map(|_| Type::Real);
                 match own.or(r) {
-                    Some(kind) => self.assignment(line, after, Var::Name(Arc::from(name)), kind, at)?,
+                    Some(kind) => self.assignment(line, after, Var::named(name), kind, at)?,
                     None => return self.block(line, rest),
                 }
             }
@@ -227,7 +227,7 @@ impl Reader {
             self.free(line, left, name)?;
             self.declared.insert(Arc::from(name));
             self.names.types.insert(Arc::from(name), kind);
-            let var = Var::Name(Arc::from(name));
+            let var = Var::named(name);
             left = if after.starts_with('=') {
                 self.assignment(line, after, var, kind, at)?
             } else {
@@ -453,7 +453,7 @@ impl Reader {
                 if let Var::Number(n) = var
                     && let Some((name, _)) = procedure.parameters.get(*n as usize)
                 {
-                    *var = Var::Name(name.clone());
+                    *var = Var::named(name);
                 }
             };
             if let Some(Instruction::Call { to, gives, texts, .. }) =
@@ -539,7 +539,7 @@ fn declared(input: &str) -> IResult<&str, Type> {
 /// The variable for the error number of a function.
 fn error_variable<'a>(names: &Names) -> impl Fn(&'a str) -> IResult<&'a str, Var> {
     move |input| match identifier(input)? {
-        (after, name) if names.types.get(name) == Some(&Type::Int) => Ok((after, Var::Name(Arc::from(name)))),
+        (after, name) if names.types.get(name) == Some(&Type::Int) => Ok((after, Var::named(name))),
         _ => Err(nom::Err::Error(nom::error::Error::new(input, nom::error::ErrorKind::Verify))),
     }
 }
