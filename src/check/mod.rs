@@ -65,6 +65,8 @@ pub struct Against<'a> {
     pub from: u32,
     /// Files that the control needs beside the program: name, contents.
     pub beside: &'a [(String, Source)],
+    /// A program whose dry run is not clear is not looked at any further.
+    pub dry_run_first: bool,
 }
 
 /// What came out.
@@ -429,6 +431,16 @@ fn with_parts(
         clear_from_anywhere: opening.clear_from_anywhere,
         neutral: &opening.neutral,
     };
+    if against.dry_run_first
+        && let Some(dry) = runs::dry(stage, &opening)
+    {
+        let mut judge = Judge::new(&case);
+        judge.dry(&dry);
+        let findings = judge.finish();
+        if findings.iter().any(|f| f.severity == Severity::Error) {
+            return Ok(Checked::not_run(findings));
+        }
+    }
     let mut judge = Judge::new(&case);
     let (mut declined, mut branches, mut both_ways) = (Vec::new(), 0, 0);
     let told = runs::all(stage, &opening, &mut |kind, told| match kind {

@@ -104,6 +104,16 @@ pub fn all(stage: Stage<'_>, opening: &Opening, each: &mut dyn FnMut(Kind, &Expl
     }
 }
 
+/// The dry run with nothing that happens otherwise, where the program has one.
+pub fn dry(stage: Stage<'_>, opening: &Opening) -> Option<ExploredRun> {
+    match stage.program.dialect {
+        DialectName::Ngc => Runs::<ngc::Ngc>::new(stage).dry_trunk(opening),
+        DialectName::MacroB => Runs::<macro_b::MacroB>::new(stage).dry_trunk(opening),
+        DialectName::Klartext => Runs::<heidenhain::Heidenhain>::new(stage).dry_trunk(opening),
+        DialectName::Sinumerik => Runs::<sinumerik::Sinumerik>::new(stage).dry_trunk(opening),
+    }
+}
+
 struct Runs<'a, D> {
     machine: &'a Machine,
     post: &'a Postprocessor,
@@ -133,7 +143,7 @@ impl<'a, D: Dialect> Runs<'a, D> {
 
     fn all(&self, opening: &Opening, each: &mut dyn FnMut(Kind, &ExploredRun)) -> All {
         let window = opening.window;
-        let beginning = self.start(&window, 0.5, 0.3);
+        let beginning = self.beginning(opening);
         if self.only_trunks {
             return self.trunks(beginning, each);
         }
@@ -220,6 +230,15 @@ impl<'a, D: Dialect> Runs<'a, D> {
         findings.extend(moving);
         let stops = stops(&whole.trunk);
         All { whole, beyond, findings, setups: self.program.setups, stops }
+    }
+
+    /// Where the machine stands when the program begins.
+    fn beginning(&self, opening: &Opening) -> Position {
+        self.start(&opening.window, 0.5, 0.3)
+    }
+
+    fn dry_trunk(&self, opening: &Opening) -> Option<ExploredRun> {
+        self.dry(self.beginning(opening), None)
     }
 
     /// The whole run, those from each set-up, and the dry run, with nothing that happens otherwise.

@@ -42,7 +42,13 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let plan = args.plan.as_ref().map(|file| load_plan(file, &machine, io)).transpose()?;
     let text = source(args.file.display().to_string(), files::read_text_as_it_is(&args.file)?);
     let beside = beside(&check::wanted_beside(&post, &text), &args.file)?;
-    let against = Against { plan: plan.as_ref(), mounting: args.mounting.as_deref(), from: args.from, beside: &beside };
+    let against = Against {
+        plan: plan.as_ref(),
+        mounting: args.mounting.as_deref(),
+        from: args.from,
+        beside: &beside,
+        ..Against::default()
+    };
     let mut checked = check::check(&machine, &post, &text, &against)?;
     checked.findings.extend(plan.as_ref().and_then(|plan| lacks_program(plan, &post)));
     checked.findings.extend(other_name(&post, &args.file, &text));

@@ -69,7 +69,7 @@ pub fn for_control(
         }
     }
     env.remark(&findings.0);
-    let written = |post: &Postprocessor| {
+    let written = |post: &Postprocessor| -> Result<(NcProgram, Option<(Proof, f64)>)> {
         let nc = post.program(machine, &generated.plan, &generated.path)?;
         let name = format!("{}.{}", spec.name, nc.extension);
         let proven = prove(machine, post, &generated.plan, &name, &nc, env)?;
@@ -77,10 +77,11 @@ pub fn for_control(
     };
     let (nc, proven) = match written(post) {
         // moves that are clear where they are need not be clear when they are lifted
-        Err(failure) if post.dry_run_mm == 0.0 => {
+        Err(_) if post.dry_run_mm == 0.0 => {
             let mut plain = post.clone();
             plain.without_dry_run = true;
-            let without = written(&plain).map_err(|_: Failure| failure)?;
+            // what is wrong beside its dry run is said of this one
+            let without = written(&plain)?;
             let says = "the program has no dry run: its moves are not clear of everything when they are lifted";
             env.remark(&[
                 Finding::warning("generate::no_dry_run", says).help("run it at a low feed override the first time")
@@ -118,7 +119,7 @@ pub fn prove(
         return Ok(None);
     }
     let beside = nc.sources();
-    let against = Against { plan: Some(plan), beside: &beside, ..Against::default() };
+    let against = Against { plan: Some(plan), beside: &beside, dry_run_first: true, ..Against::default() };
     let text = source(format!("{name} (not written)"), nc.text.as_str());
     let checked = check::check(machine, post, &text, &against)?;
     if checked.findings.iter().any(|f| f.severity == Severity::Error) {
