@@ -1,6 +1,7 @@
 //! Candidates and their columns, stacked so that one product serves all.
 
 use nalgebra::{DMatrix, DMatrixView, DVectorView};
+use rayon::prelude::*;
 use std::borrow::Borrow;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
@@ -121,7 +122,8 @@ impl Library {
     /// A library of columns in memory that belong to no candidate yet ([`Library::place`]).
     #[must_use]
     pub fn kept(n_rows: usize, mut data: Vec<f64>) -> Self {
-        clear_rounding(&mut data, n_rows);
+        const COLUMNS_AT_ONCE: usize = 64;
+        data.par_chunks_mut((COLUMNS_AT_ONCE * n_rows).max(1)).for_each(|some| clear_rounding(some, n_rows));
         let count = data.len().checked_div(n_rows).unwrap_or(0);
         let part = Part { span: 0..count, columns: Columns::Kept(data) };
         Self { n_rows, parts: vec![part], candidates: Vec::new() }

@@ -212,6 +212,9 @@ pub trait Rows: Send + Sync {
     fn some(&self, rows: &[usize], um: &dyn Fn(&[usize]) -> DMatrix<f64>) -> DMatrix<f64>;
 }
 
+/// Columns that one thread makes at a time.
+const COLUMNS_AT_ONCE: usize = 64;
+
 /// All generic shapes of a table, as rows of a regression.
 #[must_use]
 pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
@@ -248,9 +251,9 @@ pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
         Library::made(n_rows, n_columns, Arc::new(make))
     } else {
         let numbers: Vec<usize> = (0..n_columns).collect();
-        let pieces: Vec<DMatrix<f64>> = numbers.par_chunks(64).map(|some| make(some, None)).collect();
-        let mut data = Vec::with_capacity(n_rows * n_columns);
-        pieces.iter().for_each(|piece| data.extend_from_slice(piece.as_slice()));
+        let mut data = vec![0.0; n_rows * n_columns];
+        let pieces = data.par_chunks_mut((COLUMNS_AT_ONCE * n_rows).max(1)).zip(numbers.par_chunks(COLUMNS_AT_ONCE));
+        pieces.for_each(|(piece, some)| piece.copy_from_slice(make(some, None).as_slice()));
         Library::kept(n_rows, data)
     };
     let mut shapes = Vec::new();
