@@ -19,7 +19,7 @@ pub enum Var {
 }
 
 impl Var {
-    /// A variable that has a name. Each name is kept once, for as long as the program runs.
+    /// A variable that has a name. Each name is kept once, until axiscal ends.
     pub fn named(name: &str) -> Self {
         Self::Name(Intern::from(name))
     }
@@ -334,7 +334,7 @@ pub type Values = HashMap<Var, f64, BuildHasherDefault<VarHasher>>;
 /// The variable in which LinuxCNC keeps what a subroutine gives back.
 pub static VALUE: LazyLock<Var> = LazyLock::new(|| Var::named("_value"));
 
-/// A fast hash of a variable: of its number, or of the place at which its name is kept.
+/// A fast hash of a variable: of its number, or of the address of its name.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct VarHasher(u64);
 

@@ -65,7 +65,7 @@ pub struct Against<'a> {
     pub from: u32,
     /// Files that the control needs beside the program: name, contents.
     pub beside: &'a [(String, Source)],
-    /// A program whose dry run is not clear is not looked at any further.
+    /// The dry run is checked first: where it has errors, they are the only findings.
     pub dry_run_first: bool,
 }
 

@@ -104,7 +104,7 @@ pub fn all(stage: Stage<'_>, opening: &Opening, each: &mut dyn FnMut(Kind, &Expl
     }
 }
 
-/// The dry run with nothing that happens otherwise, where the program has one.
+/// The dry run without missed touches and interruptions, where the program has one.
 pub fn dry(stage: Stage<'_>, opening: &Opening) -> Option<ExploredRun> {
     match stage.program.dialect {
         DialectName::Ngc => Runs::<ngc::Ngc>::new(stage).dry_trunk(opening),

@@ -108,7 +108,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         keep_other_machines(&args.out.join(MACHINES))?;
     }
     let options = Options { strict: args.strict, tcp: args.tcp };
-    // a choice was made with the usual options
+    // a choice is generated with the default options
     let made = auto.as_mut().and_then(|auto| auto.made.take()).filter(|_| options == Options::default());
     let written = match made {
         Some(made) => for_control(&machine, &spec, made, &post, &Summarised(io)),

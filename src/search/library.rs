@@ -70,7 +70,7 @@ const MOST_ROWS_KEPT: usize = 4_000;
 /// Columns that are worked on at once.
 const CHUNK: usize = 64;
 
-/// Numbers in them: 16 MB. Larger pieces of memory are handed back to the system after each use, and cleared before the next.
+/// Numbers in them: 16 MB. Larger pieces of memory may be handed back to the system after each use, and cleared before the next.
 const CHUNK_NUMBERS: usize = 2_000_000;
 
 #[derive(Clone)]

@@ -46,11 +46,11 @@ pub struct AutoProgram {
     pub better: Option<BetterPlace>,
     /// The built-in program that was taken.
     pub taken: Option<Taken>,
-    /// Plan and path, where they were made on the way.
+    /// Plan and path of `spec`, where they are generated already.
     pub made: Option<Made>,
 }
 
-/// Plan and path of a program, and what is to be said of them.
+/// Plan and path of a program, with the findings.
 type Made = (Generated, Findings);
 
 /// A built-in program that measures better than the touches that would be chosen.
@@ -168,7 +168,7 @@ pub fn auto_program(
     };
     let (_, text, made) = best.ok_or_else(nothing)?;
     let (spec, _) = program::load(&source("auto.toml", text.clone()))?;
-    // what cannot be reached was left out since: it is made anew
+    // where touches were taken out, it is generated again
     let made = || made.map_or_else(|| program::generate(machine, &spec, &Options::default()), Ok);
     let suited = if by_eye_mm.is_none() { program::written_for(machine, &mounting.name)? } else { Vec::new() };
     let made = if suited.is_empty() {
@@ -184,7 +184,7 @@ pub fn auto_program(
     Ok(AutoProgram { text, spec, better, taken: None, made: Some(made) })
 }
 
-/// The choice, and the built-in program that it does not reach: of about the same time, or better in everything.
+/// The choice as it is generated, and the built-in program that measures better: of about the same time, or better in everything.
 fn better_written(
     machine: &Machine,
     catalogue: &Catalogue,

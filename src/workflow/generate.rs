@@ -49,7 +49,7 @@ pub fn generate(
     for_control(machine, spec, program::generate(machine, spec, options)?, post, env)
 }
 
-/// Writes a program whose plan and path are made for a control, and proves it.
+/// Writes a generated program for one control, and proves it.
 ///
 /// # Errors
 /// When the program cannot be written for this control, or not be proven.
@@ -69,19 +69,25 @@ pub fn for_control(
         }
     }
     env.remark(&findings.0);
-    let written = |post: &Postprocessor| -> Result<(NcProgram, Option<(Proof, f64)>)> {
+    let written = |post: &Postprocessor, dry_run_first: bool| -> Result<(NcProgram, Option<(Proof, f64)>)> {
         let nc = post.program(machine, &generated.plan, &generated.path)?;
         let name = format!("{}.{}", spec.name, nc.extension);
-        let proven = prove(machine, post, &generated.plan, &name, &nc, env)?;
+        let beside = nc.sources();
+        let against = Against { plan: Some(&generated.plan), beside: &beside, dry_run_first, ..Against::default() };
+        let proven = prove_against(machine, post, &against, &name, &nc, env)?;
         Ok((nc, proven))
     };
-    let (nc, proven) = match written(post) {
+    let may_lack_it = post.dry_run_mm == 0.0;
+    let (nc, proven) = match written(post, may_lack_it) {
         // moves that are clear where they are need not be clear when they are lifted
-        Err(_) if post.dry_run_mm == 0.0 => {
+        Err(_) if may_lack_it => {
             let mut plain = post.clone();
             plain.without_dry_run = true;
-            // what is wrong beside its dry run is said of this one
-            let without = written(&plain)?;
+            // not the dry run alone is wrong: all findings are those of the whole program
+            let without = match written(&plain, false) {
+                Ok(without) => without,
+                Err(of_plain) => return Err(written(post, false).err().unwrap_or(of_plain)),
+            };
             let says = "the program has no dry run: its moves are not clear of everything when they are lifted";
             env.remark(&[
                 Finding::warning("generate::no_dry_run", says).help("run it at a low feed override the first time")
@@ -109,6 +115,19 @@ pub fn prove(
     nc: &NcProgram,
     env: &dyn Environment,
 ) -> Result<Option<(Proof, f64)>> {
+    let beside = nc.sources();
+    let against = Against { plan: Some(plan), beside: &beside, ..Against::default() };
+    prove_against(machine, post, &against, name, nc, env)
+}
+
+fn prove_against(
+    machine: &Machine,
+    post: &Postprocessor,
+    against: &Against<'_>,
+    name: &str,
+    nc: &NcProgram,
+    env: &dyn Environment,
+) -> Result<Option<(Proof, f64)>> {
     if post.check.is_none() {
         let what = format!(
             "controller {} does not say how its programs are read back: the program was not checked",
@@ -118,10 +137,8 @@ pub fn prove(
             .help("write [check] in the postprocessor file: docs/guide/check.md")]);
         return Ok(None);
     }
-    let beside = nc.sources();
-    let against = Against { plan: Some(plan), beside: &beside, dry_run_first: true, ..Against::default() };
     let text = source(format!("{name} (not written)"), nc.text.as_str());
-    let checked = check::check(machine, post, &text, &against)?;
+    let checked = check::check(machine, post, &text, against)?;
     if checked.findings.iter().any(|f| f.severity == Severity::Error) {
         let mut findings = checked.findings;
         findings.push(

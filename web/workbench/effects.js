@@ -21,8 +21,6 @@ function toggle(effect, isOn, disabled) {
     click: async (e) => {
       const id = e.currentTarget.dataset.switch;
       const byKey = e.detail === 0;
-      // a second click on it asks for nothing more
-      e.currentTarget.disabled = true;
       await switchEffect(id, !isOn);
       // the row has moved to the other list: the keyboard goes along
       draw();

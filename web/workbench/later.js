@@ -22,22 +22,30 @@ export function soonest(name, job) {
 /** Forgets a job. */
 export const never = (name) => jobs.delete(name);
 
-let release = null;
+const LONGEST_PRESS_MS = 500;
+let endOfPress = null;
 let up = Promise.resolve();
 
-/** When no click is under way: what is drawn again under a pointer that is down swallows its click. */
+/** Resolves when the pointer is up, after half a second at most: a list that is drawn again during a press loses the click. */
 export const released = () => up;
 
 addEventListener("pointerdown", () => {
-  if (release) return;
+  endOfPress?.();
   up = new Promise((done) => {
-    release = () => { release = null; done(); };
-    // who holds the pointer down for longer does not click
-    setTimeout(release, 500);
+    const end = () => {
+      clearTimeout(timer);
+      if (endOfPress === end) endOfPress = null;
+      done();
+    };
+    const timer = setTimeout(end, LONGEST_PRESS_MS);
+    endOfPress = end;
   });
 }, true);
-// the click itself comes right after the pointer goes up
-addEventListener("pointerup", () => setTimeout(() => release?.()), true);
+addEventListener("pointerup", () => {
+  const end = endOfPress;
+  // the click itself comes right after the pointer goes up
+  setTimeout(() => end?.());
+}, true);
 
 function wake() {
   if (waiting) return;

@@ -16,6 +16,7 @@ async function put(live) {
   if (state.live && live.version < state.live.version) return;
   if (!state.inputs || state.inputs.inputs !== live.inputs) {
     const inputs = await ask("/api/inputs");
+    await released();
     if (inputs.inputs !== live.inputs) return refresh();
     state.inputs = inputs;
   }
@@ -45,15 +46,23 @@ export function trouble(error) {
 
 let busy = false;
 let last = Promise.resolve();
+/** What the steps ask for that wait or are being made. */
+const asked = new Set();
 
-/** Makes a step: one at a time, each asked of the state that is shown; one that is asked for meanwhile waits for its turn,
- *  so that no click is lost. `first` is done before it is asked for. */
+/** Makes a step. Steps follow one another, each from the state at its turn: no click is lost. A step that is asked for already is
+ *  not made twice. `first` is done before it. */
 export function step(what, first = null) {
-  last = last.then(() => make(what, first));
-  return last;
+  const own = JSON.stringify(what);
+  if (asked.has(own)) return Promise.resolve(false);
+  asked.add(own);
+  const made = last.then(() => make(what, first)).finally(() => asked.delete(own));
+  last = made.catch(() => {});
+  return made;
 }
 
 async function make(what, first) {
+  // a state that waits for the end of the press comes first
+  await released();
   if (!state.live) return false;
   busy = true;
   const began = performance.now();

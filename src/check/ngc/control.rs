@@ -19,7 +19,7 @@ use std::collections::{BTreeMap, HashMap};
 /// How many coordinate systems there are: G54 … G59.3.
 const SYSTEMS: usize = 9;
 
-/// Variables of a subroutine that are made room for when it begins.
+/// Memory is kept for so many variables when a subroutine begins.
 const ARGUMENTS: usize = 14;
 
 /// The modes that M73 keeps.
@@ -488,7 +488,6 @@ impl Dialect for Ngc {
 
     fn entered(&mut self) {
         self.kept.push(None);
-        // room for what a subroutine is given
         self.locals.push(Values::with_capacity_and_hasher(ARGUMENTS, Default::default()));
     }
 

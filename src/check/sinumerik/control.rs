@@ -568,12 +568,9 @@ impl Dialect for Sinumerik {
     /// M30 and a reset bring back the modes that the machine's own data name; what is written into R parameters stays.
     fn settings(&self) -> BTreeMap<String, String> {
         let is_r = |v: &Var| matches!(v, Var::Name(n) if n.strip_prefix('R').is_some_and(|n| n.bytes().all(|b| b.is_ascii_digit())));
-        let written: Vec<String> = self
-            .own
-            .iter()
-            .filter(|(v, _)| is_r(v) && !self.found_in.contains(v))
-            .map(|(v, x)| format!("{v}={x:.6}"))
-            .collect();
+        let own = self.own.iter().filter(|(v, _)| is_r(v) && !self.found_in.contains(v));
+        let written: BTreeMap<&Var, &f64> = own.collect();
+        let written: Vec<String> = written.into_iter().map(|(v, x)| format!("{v}={x:.6}")).collect();
         BTreeMap::from([("R parameters".to_owned(), written.join(" "))])
     }
 
