@@ -241,11 +241,11 @@ fn a_study_that_another_process_changes_is_not_changed() {
 fn a_fault_of_the_program_is_one_line_and_one_finding() {
     let dir = folder();
     let call = |words: &[&str]| {
-        let limited = "ulimit -v 1000000; exec \"$0\" \"$@\"";
+        let limited = "ulimit -v 4000000; exec \"$0\" \"$@\"";
         let mut command = Command::new("sh");
         command.current_dir(dir.path()).args(["-c", limited, env!("CARGO_BIN_EXE_axiscal")]).args(words);
         // large stacks: when the next one does not fit, there is still memory for the message
-        command.env("RUST_MIN_STACK", "67108864").env("RAYON_NUM_THREADS", "2000").output().unwrap()
+        command.env("RUST_MIN_STACK", "1000000000").env("RAYON_NUM_THREADS", "2000").output().unwrap()
     };
     let before = text(dir.path(), "study.toml");
     for words in [&["compare", "study.toml", "--csv", "new.csv"][..], &["add", "study.toml", "squareness-xy"]] {
