@@ -44,6 +44,9 @@ fn main() {
             summary.tau2_ratio,
             begun.elapsed().as_secs_f64()
         );
+        if let Some([low, high]) = summary.shown_um {
+            println!("scatter per visit as the residuals show it: {low:.2} to {high:.2} um in 68 % of the runs");
+        }
         println!("| parameter | RMS error / Cramér-Rao bound | inside its 95 % interval |\n|---|---|---|");
         let (set_ups, results): (Vec<_>, Vec<_>) = summary.rows.iter().partition(|r| r.name.contains('@'));
         table += &line(case, &summary, &results);

@@ -5,7 +5,7 @@ use super::explore::{Branch, Deviation, ExploredRun};
 use super::run::{Alarm, Event, Happened};
 use super::settings::{compare_settings, stopped_by_itself};
 use crate::axes::Position;
-use std::collections::BTreeMap;
+use std::borrow::Cow;
 use std::ops::Range;
 
 /// The line with which the log of a run ends.
@@ -79,11 +79,11 @@ pub fn branch_stops(
     let alarmed = branch.trace.iter().any(
         |h| matches!(&h.event, Event::Probe { probe, outcome, .. } if probe.alarm == Alarm::AtEvent && outcome.hit),
     );
-    let mut after = BTreeMap::clone(&branch.settings);
+    let mut after = Cow::Borrowed(branch.settings.as_ref());
     if alarmed {
         // the package's own alarm: what it leaves is the package's, and the postprocessor file says what that is
         let calls = case.post.check.as_ref().map(|c| c.calls.as_slice()).unwrap_or_default();
-        after.retain(|name, _| !calls.iter().any(|c| c.leaves.contains(name)));
+        after.to_mut().retain(|name, _| !calls.iter().any(|c| c.leaves.contains(name)));
     }
     let stopped = stopped_by_itself(&branch.trace);
     compare_settings(case, [&told.settings[0], &after], stopped, &first.at, what, said);

@@ -344,7 +344,11 @@ impl Hasher for VarHasher {
     }
 
     fn write(&mut self, bytes: &[u8]) {
-        bytes.iter().for_each(|byte| self.write_u64(u64::from(*byte)));
+        for eight in bytes.chunks(8) {
+            let mut word = [0; 8];
+            word.iter_mut().zip(eight).for_each(|(slot, byte)| *slot = *byte);
+            self.write_u64(u64::from_le_bytes(word));
+        }
     }
 
     fn write_u64(&mut self, word: u64) {

@@ -7,8 +7,8 @@
 
 use super::code::{Expr, Instruction, Statement, Var, VarHasher};
 use super::run::{Dialect, Run};
-use std::collections::{BTreeMap, HashMap};
-use std::hash::BuildHasherDefault;
+use std::collections::BTreeMap;
+use std::hash::{BuildHasher as _, BuildHasherDefault};
 
 /// Why a value is not known.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,8 +33,10 @@ impl Doubt {
 /// The variables of a program whose values are not known, and the conditions that depended on them.
 #[derive(Debug, Clone, Default)]
 pub struct Doubts {
-    /// Local variables by how deep their subroutine is called; the others at 0.
-    values: BTreeMap<usize, HashMap<Var, Doubt, BuildHasherDefault<VarHasher>>>,
+    /// Few: variables with how deep their subroutine is called; 0 for those that are not local.
+    values: Vec<(usize, Var, Doubt)>,
+    /// The bits ([`bit`]) of all variables that were ever among them: most variables are not.
+    ever: u64,
     /// By statement: the condition did not hold in a run, it held in one.
     pub taken: Taken,
     /// The other ways of conditions with at least this doubt are kept.
@@ -50,8 +52,13 @@ pub struct Doubts {
 impl Doubts {
     /// A subroutine begins at this depth.
     pub fn enters(&mut self, depth: usize) {
-        self.values.remove(&depth);
+        self.values.retain(|(at, ..)| *at != depth);
     }
+}
+
+/// One of 64 bits for each variable.
+fn bit(var: &Var) -> u64 {
+    1 << (BuildHasherDefault::<VarHasher>::default().hash_one(var) % 64)
 }
 
 /// By statement: its condition did not hold, it held.
@@ -84,10 +91,11 @@ impl<D: Dialect> Run<'_, D> {
 
     /// Of a variable that the program has given a value.
     fn held_doubt(&self, var: &Var) -> Option<Doubt> {
-        if self.doubts.values.is_empty() {
+        if self.doubts.ever & bit(var) == 0 {
             return None;
         }
-        self.doubts.values.get(&self.depth_of(var))?.get(var).copied()
+        let held = |(depth, known, _): &&(usize, Var, Doubt)| known == var && *depth == self.depth_of(var);
+        self.doubts.values.iter().find(held).map(|(.., doubt)| *doubt)
     }
 
     /// Is the value of a variable not known?
@@ -109,15 +117,13 @@ impl<D: Dialect> Run<'_, D> {
 
     /// A variable has been given a value.
     pub(super) fn given(&mut self, var: &Var, doubt: Option<Doubt>) {
-        let depth = self.depth_of(var);
-        match doubt {
-            Some(doubt) => {
-                self.doubts.values.entry(depth).or_default().insert(*var, doubt);
-            }
-            None => {
-                self.doubts.values.get_mut(&depth).map(|at| at.remove(var));
-            }
+        if doubt.is_none() && self.doubts.ever & bit(var) == 0 {
+            return;
         }
+        self.doubts.ever |= bit(var);
+        let depth = self.depth_of(var);
+        self.doubts.values.retain(|(at, known, _)| (*at, known) != (depth, var));
+        self.doubts.values.extend(doubt.map(|doubt| (depth, *var, doubt)));
     }
 
     /// A condition that depends on an unknown value: `holds` leads on to `here`, otherwise it leads to `to`.

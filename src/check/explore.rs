@@ -49,7 +49,7 @@ pub struct Branch {
     pub over: bool,
     /// It could not go on.
     pub fault: Option<Fault>,
-    /// The control's settings at the end; most branches end with the same.
+    /// The control's settings at the end, where it had to stop and did; most branches end with the same.
     pub settings: Arc<BTreeMap<String, String>>,
 }
 
@@ -394,7 +394,9 @@ fn until_it_stops<D: Dialect>(mut run: Run<'_, D>, deviation: Deviation) -> Vec<
             }
         }
     }
-    let (over, settings) = (run.is_over(), Arc::new(run.dialect.settings()));
+    let over = run.is_over();
+    let is_compared = deviation.must_stop() && over && fault.is_none();
+    let settings = Arc::new(if is_compared { run.dialect.settings() } else { BTreeMap::new() });
     branches.insert(0, Branch { deviation, over, fault, settings, trace: run.vm.trace });
     branches
 }

@@ -176,45 +176,47 @@ impl<'a, D: Dialect> Runs<'a, D> {
             }
             each(kind, told);
         };
-        let again = self.again(&whole, beginning);
+        let left = whole.left.after_abort().filter(|_| whole.told.fault.is_none());
         let Explored { told: whole, forks, mut cut, .. } = whole;
         let mut open = self.forks(&whole, forks, None);
         note(&mut all_taken, &whole);
-        looked_at(Kind::Begun, &whole);
-        // 2 … the last set-up, and one more that only gives the settings back; as many at once as there are threads
-        let some = rayon::current_num_threads().max(1);
+        // 2 … the last set-up, and one more that only gives the settings back; the whole one is looked at while the first are made
         let numbers: Vec<u32> = (2..=self.last()).collect();
-        for some in numbers.chunks(some) {
-            let made: Vec<Explored<'a, D>> =
-                some.par_iter().map(|k| self.explored(*k, Start::Awkward, beginning, Some(limits))).collect();
-            for Explored { told, forks, cut: own, .. } in made {
-                cut = cut.or(own);
-                open.extend(self.forks(&told, forks, Some(&whole)));
-                note(&mut all_taken, &told);
-                looked_at(Kind::Begun, &told);
-            }
-        }
+        let from_there = |k: &u32| self.explored(*k, Start::Awkward, beginning, Some(limits));
+        made_ahead(&numbers, from_there, |made| {
+            let Some(Explored { told, forks, cut: own, .. }) = made else {
+                looked_at(Kind::Begun, &whole);
+                return;
+            };
+            cut = cut.or(own);
+            open.extend(self.forks(&told, forks, Some(&whole)));
+            note(&mut all_taken, &told);
+            looked_at(Kind::Begun, &told);
+        });
         // the same from elsewhere
         let starts: Vec<Start> = [Start::Fresh, Start::Third]
             .into_iter()
             .chain(D::lasting(self.tcp()).iter().map(|what| Start::LeftoverMode(*what)))
             .collect();
         let mut findings = Vec::new();
-        for some in starts.chunks(some) {
-            let made: Vec<ExploredRun> = some.par_iter().map(|start| self.told(1, *start, elsewhere, None)).collect();
-            for other in made {
-                findings.extend(otherwise(&whole, &other).filter(|_| !stays(&other)));
-                note(&mut all_taken, &other);
-                looked_at(Kind::Other, &other);
-            }
-        }
+        let from_elsewhere = |start: &Start| self.told(1, *start, elsewhere, None);
+        made_ahead(&starts, from_elsewhere, |made| {
+            let Some(other) = made else { return };
+            findings.extend(otherwise(&whole, &other).filter(|_| !stays(&other)));
+            note(&mut all_taken, &other);
+            looked_at(Kind::Other, &other);
+        });
+        let (again, (dry, refused)) = rayon::join(
+            || left.map(|left| self.again(left, beginning)),
+            || (self.dry(beginning, Some(limits)), self.refused(beginning)),
+        );
         let mut moving = Vec::new();
-        for refused in self.refused(beginning) {
+        for refused in refused {
             moving.extend(moves_all_the_same(&refused, self.program.setups));
             note(&mut all_taken, &refused);
             looked_at(Kind::Refused, &refused);
         }
-        if let Some(dry) = self.dry(beginning, Some(limits)) {
+        if let Some(dry) = dry {
             looked_at(Kind::Dry, &dry);
         }
         again.iter().for_each(|again| note(&mut all_taken, again));
@@ -246,11 +248,8 @@ impl<'a, D: Dialect> Runs<'a, D> {
         let whole = self.told(1, Start::Awkward, beginning, None);
         each(Kind::Begun, &whole);
         let numbers: Vec<u32> = (2..=self.last()).collect();
-        for some in numbers.chunks(rayon::current_num_threads().max(1)) {
-            let made: Vec<ExploredRun> =
-                some.par_iter().map(|k| self.told(*k, Start::Awkward, beginning, None)).collect();
-            made.iter().for_each(|told| each(Kind::Begun, told));
-        }
+        let from_there = |k: &u32| self.told(*k, Start::Awkward, beginning, None);
+        made_ahead(&numbers, from_there, |made| made.iter().for_each(|told| each(Kind::Begun, told)));
         if let Some(dry) = self.dry(beginning, None) {
             each(Kind::Dry, &dry);
         }
@@ -372,14 +371,8 @@ impl<'a, D: Dialect> Runs<'a, D> {
 
     /// What is mounted when the program begins at a set-up: that of the first touch that it then makes.
     fn part_of(&self, from: u32, start: Start, at: Position, parts: usize) -> usize {
-        let fits = |part: &usize| {
-            let told = explore(self.run(from, start, at, *part, true), from, None, &|_| None).told;
-            let first = told.trunk.iter().find_map(|h| match &h.event {
-                Event::Log(text) if text.starts_with('P') => number_after_n(text),
-                _ => None,
-            });
-            first.is_some_and(|id| self.part_of_touch(id) == Some(*part))
-        };
+        let first = |part: usize| first_touch(self.run(from, start, at, part, true));
+        let fits = |part: &usize| first(*part).is_some_and(|id| self.part_of_touch(id) == Some(*part));
         (0..parts).find(fits).unwrap_or(0)
     }
 
@@ -483,6 +476,21 @@ impl<'a, D: Dialect> Runs<'a, D> {
     }
 }
 
+/// Makes runs, as many at once as there are threads, and looks at them in their order while the next ones are made. It looks at nothing
+/// first.
+fn made_ahead<I: Sync, T: Send>(of: &[I], make: impl Fn(&I) -> T + Sync, mut look: impl FnMut(Option<T>)) {
+    let mut ready = vec![None];
+    for some in of.chunks(rayon::current_num_threads().max(1)) {
+        let mut next = Vec::new();
+        rayon::in_place_scope(|scope| {
+            scope.spawn(|_| next = some.par_iter().map(|one| Some(make(one))).collect());
+            ready.drain(..).for_each(&mut look);
+        });
+        ready = next;
+    }
+    ready.into_iter().for_each(look);
+}
+
 /// Notes the ways that a run took at conditions on values that are not known.
 fn note(taken: &mut Taken, told: &ExploredRun) {
     for (statement, [no, yes]) in &told.taken {
@@ -535,6 +543,26 @@ fn stops(trunk: &[Happened]) -> usize {
         }
     }
     stops
+}
+
+/// The touch that a run logs first.
+fn first_touch<D: Dialect>(mut run: Run<'_, D>) -> Option<u64> {
+    loop {
+        let seen = run.vm.trace.len();
+        let paused = run.on();
+        let logged = run.vm.trace.iter().skip(seen).find_map(|h| match &h.event {
+            Event::Log(text) if text.starts_with('P') => number_after_n(text),
+            _ => None,
+        });
+        match (logged, paused) {
+            (Some(id), _) => return Some(id),
+            (None, Ok(Pause::Probe(probe))) => {
+                let outcome = run.vm.world.outcome(&run.vm, &probe);
+                run.resolve(outcome);
+            }
+            (None, _) => return None,
+        }
+    }
 }
 
 /// The number behind the first N of a line of the log.

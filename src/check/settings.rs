@@ -40,6 +40,9 @@ pub fn compare_settings(
     when: &str,
     said: &mut CollectedFindings,
 ) {
+    if before == after {
+        return;
+    }
     let left = case.post.check.as_ref().map(|c| c.leaves.as_slice()).unwrap_or_default();
     let tcp = case.plan.is_some_and(|p| p.controller_frame == ControllerFrame::Tcp);
     let stays = case.post.check.as_ref().map(|c| c.stays_on.as_slice()).filter(|_| tcp && stopped).unwrap_or_default();

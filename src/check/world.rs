@@ -3,10 +3,12 @@
 //! A program speaks in the control's coordinates: machine coordinates of the axes, or of the tool centre point under the
 //! control's own transformation. [`World::axes`] turns them into axis positions relative to R.
 
+use super::code::VarHasher;
 use super::run::{Outcome, Probe, Vm};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::simulate::Errorless;
 use std::collections::HashMap;
+use std::hash::BuildHasherDefault;
 use std::sync::{PoisonError, RwLock};
 
 /// The machine with what is mounted in each part of a program.
@@ -16,14 +18,29 @@ pub struct World {
     origin: Position,
     tcp: bool,
     /// Which part of a way is made until a block is met: the run from each set-up makes the same ways as the whole one.
-    met: RwLock<HashMap<Way, Option<f64>>>,
+    met: Kept<12, Option<f64>>,
+    /// The same of the places at which the program asks whether the probe is deflected.
+    touched: Kept<6, bool>,
 }
 
-/// What is mounted, and where a way begins and ends: bits, so that only the very same way is the same.
-type Way = (usize, [u64; 12]);
+/// What is known, by what is mounted and the bits of a place or a way: only the very same one is the same.
+type Kept<const N: usize, T> = RwLock<HashMap<(usize, [u64; N]), T, BuildHasherDefault<VarHasher>>>;
 
-/// Ways that are kept, some 10 MB.
-const MOST_WAYS: usize = 50_000;
+/// How many are kept, some 10 MB.
+const MOST_KEPT: usize = 50_000;
+
+/// What is known already, or else what is computed.
+fn kept<const N: usize, T: Copy>(all: &Kept<N, T>, key: (usize, [u64; N]), compute: impl FnOnce() -> T) -> T {
+    if let Some(known) = all.read().unwrap_or_else(PoisonError::into_inner).get(&key) {
+        return *known;
+    }
+    let value = compute();
+    let mut all = all.write().unwrap_or_else(PoisonError::into_inner);
+    if all.len() < MOST_KEPT {
+        all.insert(key, value);
+    }
+    value
+}
 
 /// How far a probe moves off a face until it closes, mm: any small way will do.
 const RELEASED_MM: f64 = 0.02;
@@ -31,7 +48,7 @@ const RELEASED_MM: f64 = 0.02;
 impl World {
     /// `origin`: machine coordinates at R's origin. `tcp`: coordinates are those of the tool centre point.
     pub fn new(parts: Vec<Errorless>, origin: &AxisMap, tcp: bool) -> Self {
-        Self { parts, origin: origin.position(), tcp, met: RwLock::default() }
+        Self { parts, origin: origin.position(), tcp, met: RwLock::default(), touched: RwLock::default() }
     }
 
     /// Are the control's coordinates those of the tool centre point?
@@ -59,7 +76,9 @@ impl World {
 
     /// Does the ball touch a block here, the blocks standing off by `shift`?
     pub fn touches(&self, part: usize, at: &Position, shift: &[f64; 3]) -> bool {
-        self.parts.get(part).is_some_and(|p| p.touches(&self.axes(part, &shifted(at, shift))))
+        let at = shifted(at, shift);
+        let is_met = |p: &Errorless| p.touches(&self.axes(part, &at));
+        kept(&self.touched, (part, at.0.map(f64::to_bits)), || self.parts.get(part).is_some_and(is_met))
     }
 
     /// How a probing move ends.
@@ -86,16 +105,8 @@ impl World {
     fn meets_at(&self, part: usize, from: &Position, to: &Position) -> Option<f64> {
         let mut bits = [0; 12];
         bits.iter_mut().zip(from.0.iter().chain(&to.0)).for_each(|(bits, x)| *bits = x.to_bits());
-        let way = (part, bits);
-        if let Some(known) = self.met.read().unwrap_or_else(PoisonError::into_inner).get(&way) {
-            return *known;
-        }
-        let met = self.parts.get(part).and_then(|p| p.first(from, to)).map(|m| m.part);
-        let mut kept = self.met.write().unwrap_or_else(PoisonError::into_inner);
-        if kept.len() < MOST_WAYS {
-            kept.insert(way, met);
-        }
-        met
+        let first = |p: &Errorless| p.first(from, to).map(|m| m.part);
+        kept(&self.met, (part, bits), || self.parts.get(part).and_then(first))
     }
 
     /// The block that a search meets.

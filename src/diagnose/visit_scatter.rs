@@ -7,7 +7,7 @@
 use super::candidate_effects::Named;
 use super::evidence::Evidence;
 use super::features;
-use crate::fit::residual_scatter::{MOST_TIMES, known_beforehand};
+use crate::fit::residual_scatter::MOST_TIMES;
 use crate::fit::{Fit, VisitSource, declared_tau_mm};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
@@ -95,6 +95,12 @@ fn estimated(
         }
     });
     Some(scatter_that_fits(supposed.collect(), &library, first.pure, MOST_AT_ONCE))
+}
+
+/// What is known of the scatter before a measurement, as a part of −2 ln L: a declared value is uncertain by 0.7 of itself. It is bound
+/// more tightly than in the fit: an effect that is missing must not pass for scatter.
+fn known_beforehand(tau_mm: f64, declared_mm: f64) -> f64 {
+    2.0 * (tau_mm / declared_mm - 1.0).powi(2)
 }
 
 /// The evidence with the declared scatter of visits, where revisits show far more than that and a few effects or shapes

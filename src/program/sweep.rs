@@ -10,6 +10,7 @@ use super::scene::{Obstacle, Part, Placement, Role, Scene, Solid, box_gap};
 use crate::axes::{AxisName, Position};
 use crate::units::rad_from_deg;
 use nalgebra::Vector3;
+use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vec3;
 
 /// Pieces of a move are not halved below this way, mm: gaps that come within half of it of what is needed count as
@@ -95,6 +96,11 @@ impl Scene<'_> {
         needed.map(|mm| (mm + displacement - self.slack_mm).max(0.0))
     }
 
+    /// The box along R's axes of each part of the tool.
+    fn boxes(&self, placed: &Placement) -> Vec<Aabb> {
+        self.parts.iter().map(|(_, solid)| solid.aabb(&placed.tool)).collect()
+    }
+
     /// Proves a straight move of linear axes clear.
     ///
     /// # Errors
@@ -103,6 +109,7 @@ impl Scene<'_> {
         let (start, end) = (self.place(from), self.place(to));
         let mut worst: Option<Hit> = None;
         let tool_way = end.tool.translation.vector - start.tool.translation.vector;
+        let boxes = self.boxes(&start);
         for obstacle in &self.obstacles {
             let (Some(before), Some(after)) =
                 (start.carriers.get(obstacle.carrier), end.carriers.get(obstacle.carrier))
@@ -111,10 +118,10 @@ impl Scene<'_> {
             };
             let way = tool_way - (after.translation.vector - before.translation.vector);
             let obstacle_box = obstacle.solid.aabb(before);
-            for (part, solid) in &self.parts {
+            for ((part, solid), own) in self.parts.iter().zip(&boxes) {
                 let Some(needed) = self.needed(*part, obstacle, manner) else { continue };
                 // the box of the whole move against the obstacle's: far most pairs end here
-                let mut swept = solid.aabb(&start.tool);
+                let mut swept = *own;
                 let shift = Vec3::new(way.x, way.y, way.z);
                 swept.mins = swept.mins.min(swept.mins + shift);
                 swept.maxs = swept.maxs.max(swept.maxs + shift);
@@ -148,12 +155,13 @@ impl Scene<'_> {
                 self.place(&end)
             })
             .collect();
+        let boxes = self.boxes(&start);
         for obstacle in &self.obstacles {
             let Some(before) = start.carriers.get(obstacle.carrier) else { continue };
             let obstacle_box = obstacle.solid.aabb(before);
-            for (part, solid) in &self.parts {
+            for ((part, _), own) in self.parts.iter().zip(&boxes) {
                 let Some(needed) = self.needed(*part, obstacle, Manner::Rapid) else { continue };
-                let mut swept = solid.aabb(&start.tool);
+                let mut swept = *own;
                 for end in &ends {
                     let Some(after) = end.carriers.get(obstacle.carrier) else { continue };
                     let tool = end.tool.translation.vector - start.tool.translation.vector;

@@ -14,6 +14,7 @@ use axiscal::model::data::Run;
 use axiscal::model::data::{Data, assemble};
 use axiscal::program::plan::Plan;
 use axiscal::simulate::Scenario;
+use axiscal::units::um_from_mm;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -265,6 +266,9 @@ pub struct Summary {
     /// Mean of τ̂², in units of the true one.
     pub tau2_ratio: f64,
     #[allow(dead_code)] // printed by the example
+    /// Scatter of visits as the residuals of each run show it, µm: 16th and 84th percentile; `None` where it is known otherwise.
+    pub shown_um: Option<[f64; 2]>,
+    #[allow(dead_code)] // printed by the example
     /// Rejected touches per thousand.
     pub rejected_per_mille: f64,
 }
@@ -357,6 +361,7 @@ pub fn run(case: &Case, runs: usize, n_virtual: usize, seed: u64) -> Summary {
         chi2: f64,
         tail: f64,
         tau2: f64,
+        shown_um: Option<f64>,
         rejected: usize,
         tau_estimated: bool,
     }
@@ -389,11 +394,15 @@ pub fn run(case: &Case, runs: usize, n_virtual: usize, seed: u64) -> Summary {
                 tail: lack_of_fit(fit.chi2, fit.dof, fit.noise.dof),
                 tau_estimated: fit.noise.visit_source == fit::VisitSource::Revisits,
                 tau2: fit.noise.tau_mm.powi(2),
+                shown_um: fit.noise.visits_shown.map(|shown| um_from_mm(shown.tau_mm)),
                 rejected: fit.rejected.len(),
             }
         })
         .collect();
     let n = runs as f64;
+    let mut shown_um: Vec<f64> = all.iter().filter_map(|o| o.shown_um).collect();
+    shown_um.sort_by(f64::total_cmp);
+    let percentile = |part: f64| shown_um[(part * (shown_um.len() - 1) as f64).round() as usize];
     let rows = results
         .iter()
         .enumerate()
@@ -419,6 +428,7 @@ pub fn run(case: &Case, runs: usize, n_virtual: usize, seed: u64) -> Summary {
         } else {
             0.0
         },
+        shown_um: (!shown_um.is_empty()).then(|| [percentile(0.16), percentile(0.84)]),
         rejected_per_mille: 1e3 * all.iter().map(|o| o.rejected).sum::<usize>() as f64
             / n
             / perfect.observations.len() as f64,

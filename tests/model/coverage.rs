@@ -30,6 +30,7 @@ fn intervals_a_twentieth_off_are_refused() {
         tau_estimated: false,
         dof: 300,
         tau2_ratio: 0.0,
+        shown_um: None,
         rejected_per_mille: 0.0,
     };
     let refused = |factor: f64| coverage::check_together(&vec![summary(factor); coverage::CASES.len()], 3.5).len();

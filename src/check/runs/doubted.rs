@@ -69,11 +69,11 @@ impl<'a, D: Dialect> Runs<'a, D> {
         forks.into_iter().filter(is_new).map(|fork| (self.begun(told, &fork), fork)).collect()
     }
 
-    /// The program once more, with the control as its own run has left it; `None`: nothing of it lasts.
-    pub(super) fn again(&self, whole: &Explored<'_, D>, at: Position) -> Option<ExploredRun> {
+    /// The program once more, with the control as its own run has left it.
+    pub(super) fn again(&self, left: D, at: Position) -> ExploredRun {
         let mut run = self.run(1, Start::Awkward, at, 0, false);
-        run.dialect = whole.left.after_abort().filter(|_| whole.told.fault.is_none())?;
-        Some(ExploredRun { start: Start::Awkward, ..explore(run, 1, None, &|_| None).told })
+        run.dialect = left;
+        ExploredRun { start: Start::Awkward, ..explore(run, 1, None, &|_| None).told }
     }
 
     fn begun(&self, parent: &ExploredRun, fork: &Fork<'_, D>) -> ExploredRun {
