@@ -137,7 +137,7 @@ impl Visits {
     }
 
     fn cost_s(&self, pool: &[Bundle], visits: &[usize]) -> f64 {
-        cost_s(pool, &self.members(visits))
+        cost_s(self.members(visits).into_iter().map(|i| &pool[i]))
     }
 
     /// What one more visit takes, s: a stylus that is in use already need not be changed.

@@ -343,12 +343,11 @@ pub fn as_plan(machine: &Machine, mounting: &Mounting, bundles: &[Bundle], time_
 
 /// What a choice takes, s: touches, an index for each pose, changes of stylus.
 #[must_use]
-pub fn cost_s(pool: &[Bundle], chosen: &[usize]) -> f64 {
+pub fn cost_s<'a>(chosen: impl IntoIterator<Item = &'a Bundle>) -> f64 {
     let mut manners: Vec<&Manner> = Vec::new();
     let mut styli: BTreeSet<&str> = BTreeSet::new();
     let mut seconds = 0.0;
-    for &i in chosen {
-        let b = &pool[i];
+    for b in chosen {
         // a feed of its own slows or speeds the measuring stroke only: a touch is mostly way
         seconds += TOUCH_S * b.touches.len() as f64;
         if !manners.contains(&&b.manner) {

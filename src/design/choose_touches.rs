@@ -32,6 +32,15 @@ const MOST_ROUNDS: usize = 12;
 /// Bundles that one round of the exchange tries to leave out.
 const MOST_OUT: usize = 6;
 
+/// Bundles beside the chosen ones that the exchange may take in: those that are worth most.
+const MOST_IN: usize = 150;
+
+/// Those of them that one round of it looks at: worth most beside all that are chosen.
+const MOST_FOR_ONE: usize = 40;
+
+/// Bundles that are looked at together.
+const AT_ONCE: usize = 8;
+
 /// Information about the model's unknowns and the effects in question, bundle by bundle.
 #[derive(Debug, Clone)]
 pub struct Design {
@@ -235,22 +244,58 @@ impl Design {
     #[must_use]
     pub fn choose(&self, pool: &[Bundle], budget_s: f64) -> Vec<usize> {
         let Some(start) = Choice::start(self) else { return Vec::new() };
+        let pool: Vec<&Bundle> = pool.iter().collect();
+        let pool = pool.as_slice();
         // D_s finds its way where no single bundle parts a pair yet; the pairs' own worth is the other start
-        let values: [&Value; 2] = [&d_s, &|s| self.worth(s)];
+        let worth = |s: &DMatrix<f64>| self.worth(s);
+        let values: [&Value; 2] = [&d_s, &worth];
         let found = values.into_par_iter().map(|value| {
             let mut choice = start.clone();
-            choice.fill(self, pool, budget_s, None, value);
-            choice.exchange(self, pool, budget_s);
-            (self.worth(&choice.effects(self)), choice.chosen)
+            choice.fill(self, pool, budget_s, choice.gains(self, pool, value), value);
+            choice.fill(self, pool, budget_s, choice.gains(self, pool, &worth), &worth);
+            // the exchange knows few bundles: the chosen ones and those that are worth most beside them
+            let beside = choice.gains(self, pool, &worth).into_iter().map(|(i, _)| i).take(MOST_IN);
+            let few: Vec<usize> = choice.chosen.iter().copied().chain(beside).collect();
+            let of_few: Vec<&Bundle> = few.iter().map(|i| pool[*i]).collect();
+            let (worth, chosen) = self.only(&few).exchanged(&of_few, choice.chosen.len(), budget_s)?;
+            Some((worth, chosen.into_iter().map(|i| few[i]).collect()))
         });
         let nothing = (self.worth(&start.effects(self)), Vec::new());
         // ties go to the first: the same choice in every run
-        let best = found.collect::<Vec<_>>().into_iter().fold(nothing, |a, b| if b.0 > a.0 { b } else { a });
+        let best = found.collect::<Vec<_>>().into_iter().flatten().fold(nothing, |a, b| if b.0 > a.0 { b } else { a });
         self.thinned(pool, best.1)
     }
 
+    /// With these bundles only.
+    fn only(&self, few: &[usize]) -> Self {
+        let rows: Vec<usize> = few.iter().flat_map(|i| self.ranges[*i].clone()).collect();
+        let mut at = 0;
+        let ranges = few.iter().map(|i| {
+            at += self.ranges[*i].len();
+            at - self.ranges[*i].len()..at
+        });
+        let ranges = ranges.collect();
+        Self {
+            n_base: self.n_base,
+            spans: self.spans.clone(),
+            sizes: self.sizes.clone(),
+            given: self.given.clone(),
+            rows: self.rows.select_rows(&rows),
+            ranges,
+            asked: self.asked.clone(),
+        }
+    }
+
+    /// What the first `n` bundles become by exchange, and what that is worth.
+    fn exchanged(&self, pool: &[&Bundle], n: usize, budget_s: f64) -> Option<(f64, Vec<usize>)> {
+        let mut choice = Choice::start(self)?;
+        (0..n).for_each(|i| choice.take(self, i, 1.0));
+        choice.exchange(self, pool, budget_s);
+        Some((self.worth(&choice.effects(self)), choice.chosen))
+    }
+
     /// Without the bundles that no pair needs.
-    fn thinned(&self, pool: &[Bundle], mut chosen: Vec<usize>) -> Vec<usize> {
+    fn thinned(&self, pool: &[&Bundle], mut chosen: Vec<usize>) -> Vec<usize> {
         let worth = |chosen: &[usize]| {
             let products = Products::of_information(&self.information(chosen), self.n_base);
             products.map_or(0.0, |p| self.worth(p.beside_the_base()))
@@ -351,40 +396,88 @@ impl Choice {
         }
     }
 
-    /// Takes what is worth most for its time until nothing more fits, all `but` one.
-    fn fill(&mut self, design: &Design, pool: &[Bundle], budget_s: f64, but: Option<usize>, value: &Value) {
+    /// What the chosen bundles take, and one more of them, s.
+    fn cost_s(&self, pool: &[&Bundle], more: Option<usize>) -> f64 {
+        cost_s(self.chosen.iter().copied().chain(more).map(|i| pool[i]))
+    }
+
+    /// Takes what is worth most for its time until nothing more fits. `gains`: what each bundle was worth when it was looked at last, in
+    /// their order; those that are not open are none of them.
+    ///
+    /// One bundle more leaves less for most others: what was worth least is looked at again only where it might be the best by
+    /// what it was worth then (Minoux, in: Optimization Techniques, Springer 1978, 234).
+    fn fill(&mut self, design: &Design, pool: &[&Bundle], budget_s: f64, mut gains: Vec<(usize, f64)>, value: &Value) {
         loop {
             let inverse = self.inverse(design);
             let here = value(&(&inverse - Self::of_nothing(inverse.nrows())));
-            let spent = cost_s(pool, &self.chosen);
-            let gain = |i: usize| {
-                let seconds = cost_s(pool, &[&self.chosen[..], &[i]].concat());
-                let gain = (seconds <= budget_s).then(|| self.value(design, &inverse, i, 1.0, value))?? - here;
-                Some((gain / (seconds - spent), i)).filter(|g| g.0 > 1e-9)
-            };
-            let open = (0..pool.len()).into_par_iter().filter(|i| but != Some(*i) && !self.chosen.contains(i));
+            let spent = self.cost_s(pool, None);
+            let seconds = |i: usize| self.cost_s(pool, Some(i));
+            let mut open: Vec<(usize, f64, f64)> = gains
+                .iter()
+                .enumerate()
+                .map(|(place, (i, gain))| (place, *gain, seconds(*i)))
+                .filter(|(.., all)| *all <= budget_s)
+                .collect();
+            let rate = |(_, gain, all): &(usize, f64, f64)| gain / (all - spent);
             // ties go to the earlier bundle: the same choice in every run
-            match open.filter_map(gain).max_by(|a, b| a.0.total_cmp(&b.0).then(b.1.cmp(&a.1))) {
-                Some((_, i)) => self.take(design, i, 1.0),
-                None => return,
+            open.sort_by(|a, b| rate(b).total_cmp(&rate(a)).then(a.0.cmp(&b.0)));
+            let mut best: Option<(usize, f64, f64)> = None;
+            for some in open.chunks(AT_ONCE) {
+                if best.is_some_and(|best| rate(&best) >= rate(&some[0])) {
+                    break;
+                }
+                let looked_at: Vec<(usize, f64, f64)> = some
+                    .par_iter()
+                    .map(|&(place, _, all)| {
+                        let value = self.value(design, &inverse, gains[place].0, 1.0, value);
+                        (place, value.map_or(0.0, |value| value - here), all)
+                    })
+                    .collect();
+                for one in looked_at {
+                    gains[one.0].1 = one.1;
+                    if rate(&one) > best.map_or(1e-9, |best| rate(&best)) {
+                        best = Some(one);
+                    }
+                }
             }
+            let Some((place, ..)) = best else { return };
+            let (bundle, _) = gains.remove(place);
+            self.take(design, bundle, 1.0);
         }
     }
 
+    /// What each of the bundles that are not chosen is worth now, the best for its time first.
+    fn gains(&self, design: &Design, pool: &[&Bundle], value: &Value) -> Vec<(usize, f64)> {
+        let inverse = self.inverse(design);
+        let here = value(&(&inverse - Self::of_nothing(inverse.nrows())));
+        let spent = self.cost_s(pool, None);
+        let of = |i: usize| {
+            let gain = self.value(design, &inverse, i, 1.0, value).map_or(0.0, |value| value - here);
+            (gain / (self.cost_s(pool, Some(i)) - spent), (i, gain))
+        };
+        let open = (0..pool.len()).into_par_iter().filter(|i| !self.chosen.contains(i));
+        let mut all: Vec<(f64, (usize, f64))> = open.map(of).collect();
+        all.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.0.cmp(&b.1.0)));
+        all.into_iter().map(|(_, gain)| gain).collect()
+    }
+
     /// Leaves out a bundle that is missed least and fills the time again, while that pays.
-    fn exchange(&mut self, design: &Design, pool: &[Bundle], budget_s: f64) {
+    fn exchange(&mut self, design: &Design, pool: &[&Bundle], budget_s: f64) {
         let worth = |s: &DMatrix<f64>| design.worth(s);
-        self.fill(design, pool, budget_s, None, &worth);
         for _ in 0..MOST_ROUNDS {
             let here = worth(&self.effects(design));
             let inverse = self.inverse(design);
             let without = |&i: &usize| Some((self.value(design, &inverse, i, -1.0, &worth)?, i));
             let mut least: Vec<(f64, usize)> = self.chosen.iter().filter_map(without).collect();
             least.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+            let mut beside = self.gains(design, pool, &worth);
+            beside.truncate(MOST_FOR_ONE);
+            // without one of the chosen each of them may be worth more: all are looked at once
+            beside.iter_mut().for_each(|(_, gain)| *gain = f64::INFINITY);
             let tried = least.into_par_iter().take(MOST_OUT).map(|(_, out)| {
                 let mut other = self.clone();
                 other.take(design, out, -1.0);
-                other.fill(design, pool, budget_s, Some(out), &worth);
+                other.fill(design, pool, budget_s, beside.clone(), &worth);
                 (worth(&other.effects(design)), other)
             });
             let tried: Vec<(f64, Self)> = tried.collect();
