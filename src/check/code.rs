@@ -334,13 +334,17 @@ pub type Values = HashMap<Var, f64, BuildHasherDefault<VarHasher>>;
 /// The variable in which LinuxCNC keeps what a subroutine gives back.
 pub static VALUE: LazyLock<Var> = LazyLock::new(|| Var::named("_value"));
 
-/// A fast hash of a variable: of its number, or of the address of its name.
+/// An odd number whose bits look drawn: 2⁶⁴ over the golden ratio.
+const ODD: u64 = 0x9E37_79B9_7F4A_7C15;
+
+/// A fast hash of few words: a variable (its number, or the address of its name), or the bits of a place.
 #[derive(Debug, Default, Clone, Copy)]
 pub struct VarHasher(u64);
 
 impl Hasher for VarHasher {
     fn finish(&self) -> u64 {
-        self.0 ^ (self.0 >> 32)
+        let mixed = (self.0 ^ (self.0 >> 32)).wrapping_mul(ODD);
+        mixed ^ (mixed >> 32)
     }
 
     fn write(&mut self, bytes: &[u8]) {
@@ -352,8 +356,7 @@ impl Hasher for VarHasher {
     }
 
     fn write_u64(&mut self, word: u64) {
-        const PRIME: u64 = 0x9E37_79B9_7F4A_7C15;
-        self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(PRIME);
+        self.0 = (self.0.rotate_left(5) ^ word).wrapping_mul(ODD);
     }
 
     fn write_u32(&mut self, word: u32) {

@@ -246,10 +246,9 @@ impl<'a, D: Dialect> Runs<'a, D> {
     /// The whole run, those from each set-up, and the dry run, with nothing that happens otherwise.
     fn trunks(&self, beginning: Position, each: &mut dyn FnMut(Kind, &ExploredRun)) -> All {
         let whole = self.told(1, Start::Awkward, beginning, None);
-        each(Kind::Begun, &whole);
         let numbers: Vec<u32> = (2..=self.last()).collect();
         let from_there = |k: &u32| self.told(*k, Start::Awkward, beginning, None);
-        made_ahead(&numbers, from_there, |made| made.iter().for_each(|told| each(Kind::Begun, told)));
+        made_ahead(&numbers, from_there, |made| each(Kind::Begun, made.as_ref().unwrap_or(&whole)));
         if let Some(dry) = self.dry(beginning, None) {
             each(Kind::Dry, &dry);
         }
@@ -476,8 +475,8 @@ impl<'a, D: Dialect> Runs<'a, D> {
     }
 }
 
-/// Makes runs, as many at once as there are threads, and looks at them in their order while the next ones are made. It looks at nothing
-/// first.
+/// Makes runs, as many at once as there are threads, and looks at them in their order while the next ones are made. `look` is called with
+/// `None` once, while the first ones are made.
 fn made_ahead<I: Sync, T: Send>(of: &[I], make: impl Fn(&I) -> T + Sync, mut look: impl FnMut(Option<T>)) {
     let mut ready = vec![None];
     for some in of.chunks(rayon::current_num_threads().max(1)) {

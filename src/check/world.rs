@@ -19,25 +19,28 @@ pub struct World {
     tcp: bool,
     /// Which part of a way is made until a block is met: the run from each set-up makes the same ways as the whole one.
     met: Kept<12, Option<f64>>,
-    /// The same of the places at which the program asks whether the probe is deflected.
+    /// Whether the ball touches a block, by place.
     touched: Kept<6, bool>,
 }
 
 /// What is known, by what is mounted and the bits of a place or a way: only the very same one is the same.
 type Kept<const N: usize, T> = RwLock<HashMap<(usize, [u64; N]), T, BuildHasherDefault<VarHasher>>>;
 
-/// How many are kept, some 10 MB.
+/// How many are kept of each, some 10 MB.
 const MOST_KEPT: usize = 50_000;
 
 /// What is known already, or else what is computed.
 fn kept<const N: usize, T: Copy>(all: &Kept<N, T>, key: (usize, [u64; N]), compute: impl FnOnce() -> T) -> T {
-    if let Some(known) = all.read().unwrap_or_else(PoisonError::into_inner).get(&key) {
-        return *known;
-    }
+    let has_room = {
+        let known = all.read().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = known.get(&key) {
+            return *known;
+        }
+        known.len() < MOST_KEPT
+    };
     let value = compute();
-    let mut all = all.write().unwrap_or_else(PoisonError::into_inner);
-    if all.len() < MOST_KEPT {
-        all.insert(key, value);
+    if has_room {
+        all.write().unwrap_or_else(PoisonError::into_inner).insert(key, value);
     }
     value
 }

@@ -32,11 +32,8 @@ const MOST_ROUNDS: usize = 12;
 /// Bundles that one round of the exchange tries to leave out.
 const MOST_OUT: usize = 6;
 
-/// Bundles beside the chosen ones that the exchange may take in: those that are worth most.
-const MOST_IN: usize = 150;
-
-/// Those of them that one round of it looks at: worth most beside all that are chosen.
-const MOST_FOR_ONE: usize = 40;
+/// Bundles that the exchange may take in: so many of those that are worth most, before the choice and beside it.
+const MOST_IN: usize = 60;
 
 /// Bundles that are looked at together.
 const AT_ONCE: usize = 8;
@@ -246,29 +243,41 @@ impl Design {
         let Some(start) = Choice::start(self) else { return Vec::new() };
         let pool: Vec<&Bundle> = pool.iter().collect();
         let pool = pool.as_slice();
-        // D_s finds its way where no single bundle parts a pair yet; the pairs' own worth is the other start
         let worth = |s: &DMatrix<f64>| self.worth(s);
-        let values: [&Value; 2] = [&d_s, &worth];
-        let found = values.into_par_iter().map(|value| {
+        // D_s finds its way where no single bundle parts a pair yet; the pairs' own worth is the other start
+        let ways: [&[&Value]; 2] = [&[&d_s, &worth], &[&worth]];
+        let found = ways.into_par_iter().map(|way| {
             let mut choice = start.clone();
-            choice.fill(self, pool, budget_s, choice.gains(self, pool, value), value);
-            choice.fill(self, pool, budget_s, choice.gains(self, pool, &worth), &worth);
-            // the exchange knows few bundles: the chosen ones and those that are worth most beside them
+            let mut few = Vec::new();
+            for value in way {
+                let gains = choice.gains(self, pool, value);
+                few.extend(gains.iter().map(|(i, _)| *i).take(MOST_IN));
+                choice.fill(self, pool, budget_s, gains, value);
+            }
+            // the exchange knows few bundles: the chosen ones, those that were worth most before, and those beside the chosen ones
             let beside = choice.gains(self, pool, &worth).into_iter().map(|(i, _)| i).take(MOST_IN);
-            let few: Vec<usize> = choice.chosen.iter().copied().chain(beside).collect();
-            let of_few: Vec<&Bundle> = few.iter().map(|i| pool[*i]).collect();
-            let (worth, chosen) = self.only(&few).exchanged(&of_few, choice.chosen.len(), budget_s)?;
-            Some((worth, chosen.into_iter().map(|i| few[i]).collect()))
+            few.extend(beside);
+            few.retain(|i| !choice.chosen.contains(i));
+            few.sort_unstable();
+            few.dedup();
+            let few = [&choice.chosen[..], &few[..]].concat();
+            let design = self.only(&few);
+            let mut choice = choice.only(self, &few);
+            choice.exchange(&design, &few.iter().map(|i| pool[*i]).collect::<Vec<_>>(), budget_s);
+            (design.worth(&choice.effects(&design)), choice.chosen.into_iter().map(|i| few[i]).collect())
         });
         let nothing = (self.worth(&start.effects(self)), Vec::new());
         // ties go to the first: the same choice in every run
-        let best = found.collect::<Vec<_>>().into_iter().flatten().fold(nothing, |a, b| if b.0 > a.0 { b } else { a });
+        let best = found.collect::<Vec<_>>().into_iter().fold(nothing, |a, b| if b.0 > a.0 { b } else { a });
         self.thinned(pool, best.1)
+    }
+
+    fn rows_of(&self, few: &[usize]) -> Vec<usize> {
+        few.iter().flat_map(|i| self.ranges[*i].clone()).collect()
     }
 
     /// With these bundles only.
     fn only(&self, few: &[usize]) -> Self {
-        let rows: Vec<usize> = few.iter().flat_map(|i| self.ranges[*i].clone()).collect();
         let mut at = 0;
         let ranges = few.iter().map(|i| {
             at += self.ranges[*i].len();
@@ -280,18 +289,10 @@ impl Design {
             spans: self.spans.clone(),
             sizes: self.sizes.clone(),
             given: self.given.clone(),
-            rows: self.rows.select_rows(&rows),
+            rows: self.rows.select_rows(&self.rows_of(few)),
             ranges,
             asked: self.asked.clone(),
         }
-    }
-
-    /// What the first `n` bundles become by exchange, and what that is worth.
-    fn exchanged(&self, pool: &[&Bundle], n: usize, budget_s: f64) -> Option<(f64, Vec<usize>)> {
-        let mut choice = Choice::start(self)?;
-        (0..n).for_each(|i| choice.take(self, i, 1.0));
-        choice.exchange(self, pool, budget_s);
-        Some((self.worth(&choice.effects(self)), choice.chosen))
     }
 
     /// Without the bundles that no pair needs.
@@ -341,6 +342,15 @@ impl Choice {
         }
         let covariance = information.cholesky()?.inverse();
         Some(Self { chosen: Vec::new(), seen: &design.rows * &covariance, covariance })
+    }
+
+    /// With these bundles only, the chosen ones first.
+    fn only(&self, design: &Design, few: &[usize]) -> Self {
+        Self {
+            chosen: (0..self.chosen.len()).collect(),
+            covariance: self.covariance.clone(),
+            seen: self.seen.select_rows(&design.rows_of(few)),
+        }
     }
 
     /// L⁻¹AC of a bundle with rows A, some of its columns: the covariance C changes by what these rows are squared, less for one more bundle
@@ -401,11 +411,11 @@ impl Choice {
         cost_s(self.chosen.iter().copied().chain(more).map(|i| pool[i]))
     }
 
-    /// Takes what is worth most for its time until nothing more fits. `gains`: what each bundle was worth when it was looked at last, in
-    /// their order; those that are not open are none of them.
+    /// Takes what is worth most for its time until nothing more fits. `gains`: the bundles that may be taken, each with its gain when
+    /// it was last computed.
     ///
-    /// One bundle more leaves less for most others: what was worth least is looked at again only where it might be the best by
-    /// what it was worth then (Minoux, in: Optimization Techniques, Springer 1978, 234).
+    /// Gains mostly fall as bundles are taken, so a gain is computed again only if the old one could still be the best (Minoux, in:
+    /// Optimization Techniques, Springer 1978, 234). On a new block gains may rise after the first bundle: those are computed again.
     fn fill(&mut self, design: &Design, pool: &[&Bundle], budget_s: f64, mut gains: Vec<(usize, f64)>, value: &Value) {
         loop {
             let inverse = self.inverse(design);
@@ -419,7 +429,7 @@ impl Choice {
                 .filter(|(.., all)| *all <= budget_s)
                 .collect();
             let rate = |(_, gain, all): &(usize, f64, f64)| gain / (all - spent);
-            // ties go to the earlier bundle: the same choice in every run
+            // equal rates by their place: the same choice in every run
             open.sort_by(|a, b| rate(b).total_cmp(&rate(a)).then(a.0.cmp(&b.0)));
             let mut best: Option<(usize, f64, f64)> = None;
             for some in open.chunks(AT_ONCE) {
@@ -442,6 +452,8 @@ impl Choice {
             }
             let Some((place, ..)) = best else { return };
             let (bundle, _) = gains.remove(place);
+            let same_block = gains.iter_mut().filter(|(i, _)| pool[*i].block == pool[bundle].block);
+            same_block.for_each(|(_, gain)| *gain = f64::INFINITY);
             self.take(design, bundle, 1.0);
         }
     }
@@ -470,14 +482,12 @@ impl Choice {
             let without = |&i: &usize| Some((self.value(design, &inverse, i, -1.0, &worth)?, i));
             let mut least: Vec<(f64, usize)> = self.chosen.iter().filter_map(without).collect();
             least.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-            let mut beside = self.gains(design, pool, &worth);
-            beside.truncate(MOST_FOR_ONE);
-            // without one of the chosen each of them may be worth more: all are looked at once
-            beside.iter_mut().for_each(|(_, gain)| *gain = f64::INFINITY);
             let tried = least.into_par_iter().take(MOST_OUT).map(|(_, out)| {
                 let mut other = self.clone();
                 other.take(design, out, -1.0);
-                other.fill(design, pool, budget_s, beside.clone(), &worth);
+                let mut gains = other.gains(design, pool, &worth);
+                gains.retain(|(i, _)| *i != out);
+                other.fill(design, pool, budget_s, gains, &worth);
                 (worth(&other.effects(design)), other)
             });
             let tried: Vec<(f64, Self)> = tried.collect();
