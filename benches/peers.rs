@@ -1,7 +1,7 @@
 //! The crate beside its peers on the same touches and unknowns, in one run: answers compared, times as ratios.
 //!
 //! `cargo bench --bench peers` prints the table; `-- --write` puts it into `docs/performance.md` as well, and words such as
-//! `10000x60` choose sizes (touches x unknowns); `-- score` runs the score tests only; `-- --answers` compares the answers only, at small
+//! `10000x60` choose sizes (touches x unknowns); `-- score` runs the score tests only, `-- whole` the whole processes only; `-- --answers` compares the answers only, at small
 //! size, as does a call without `--bench` (`cargo test`). Peers are what `benches/peers/run` finds; `AXISCAL_PEERS_REQUIRED=1`
 //! makes a missing one an error.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a benchmark that cannot run says where
@@ -9,7 +9,7 @@
 mod comparison;
 mod problems;
 
-use comparison::{Answer, Peers, compare, identify_all, run_crate, run_identify};
+use comparison::{Answer, Peers, STUDIES, compare, identify_all, run_crate, run_identify};
 use problems::Problem;
 use std::fmt::Write;
 use std::path::Path;
@@ -34,6 +34,10 @@ fn main() {
     }
     if has("score") {
         println!("{}", score_tests());
+        return;
+    }
+    if has("whole") {
+        println!("{}{}", machine(), whole_process(&peers, folder.path()));
         return;
     }
     let mut text = machine();
@@ -101,7 +105,7 @@ fn agree(peers: &Peers, folder: &Path) {
             }
         }
     }
-    identify_all(peers, folder, 1).into_iter().for_each(drop);
+    STUDIES.iter().for_each(|study| identify_all(peers, folder, study, 1).into_iter().for_each(drop));
 }
 
 /// One size of problem: everybody's best times.
@@ -257,27 +261,57 @@ fn solvers(results: &[Size]) -> String {
 }
 
 fn whole_process(peers: &Peers, folder: &Path) -> String {
-    let [quick, plain, theirs] = identify_all(peers, folder, 12);
     let mut out = String::from(
-        "## Whole process: `identify` on the paper's 356 touches\n\nFrom the call to the answer in JSON, files read \
-         included: median (fastest) of runs that follow one of the same program, the programs in turn. Ratio: how many times as \
+        "## Whole process: `identify` on 356 touches\n\nFrom the call to the answer in JSON, files read \
+         included: median (fastest) of runs that follow one of the same program, the programs in turn, ms. Ratio: how many times as \
          fast as the script.\n\n\
-         | program | ms | ratio |\n|---|---|---|\n",
+         | unknowns | other processes | `identify --quick` | `identify` | SciPy (`benches/peers/identify.py`) | ratio |\n\
+         |---|---|---|---|---|---|\n",
     );
-    let script_s = theirs.as_ref().map(|t| (t.median_s, t.least_s));
-    let names = ["`axiscal identify --quick`", "`axiscal identify`", "SciPy (`benches/peers/identify.py`)"];
-    for (name, times) in names.into_iter().zip([quick, plain, theirs]) {
-        let Some(t) = times else {
-            writeln!(out, "| {name} | left out | |").unwrap();
-            continue;
-        };
-        let ratio = script_s.map_or_else(String::new, |(median_s, least_s)| {
-            format!("{:.0} ({:.0})", median_s / t.median_s, least_s / t.least_s)
-        });
-        writeln!(out, "| {name} | {} ({}) | {ratio} |", milliseconds(t.median_s), milliseconds(t.least_s)).unwrap();
+    for study in &STUDIES {
+        for busy in [false, true] {
+            let other = busy.then(OneCore::busy);
+            let [quick, plain, theirs] = identify_all(peers, folder, study, 6);
+            drop(other);
+            let ms = |times: &Option<comparison::Times>| {
+                times.as_ref().map_or_else(
+                    || "left out".to_owned(),
+                    |t| format!("{} ({})", milliseconds(t.median_s), milliseconds(t.least_s)),
+                )
+            };
+            let ratio = plain.as_ref().zip(theirs.as_ref()).map_or_else(String::new, |(ours, theirs)| {
+                format!("{:.0} ({:.0})", theirs.median_s / ours.median_s, theirs.least_s / ours.least_s)
+            });
+            writeln!(
+                out,
+                "| {} | {} | {} | {} | {} | {ratio} |",
+                study.unknowns,
+                if busy { "one core busy" } else { "none" },
+                ms(&quick),
+                ms(&plain),
+                ms(&theirs)
+            )
+            .unwrap();
+        }
     }
     out.push('\n');
     out
+}
+
+/// A process that keeps one core busy.
+struct OneCore(std::process::Child);
+
+impl OneCore {
+    fn busy() -> Self {
+        Self(std::process::Command::new("sh").args(["-c", "while :; do :; done"]).spawn().unwrap())
+    }
+}
+
+impl Drop for OneCore {
+    fn drop(&mut self) {
+        self.0.kill().unwrap();
+        self.0.wait().unwrap();
+    }
 }
 
 /// What this was measured on.

@@ -1,6 +1,6 @@
 """What `axiscal identify STUDY --json` does, with SciPy: the whole process from the study's path to the answer.
 
-For `swivel-head`, touches CSVs, and the effects location-b, location-c, pretravel, block-setup.
+For `swivel-head`, touches CSVs, and the effects location-b, location-c, pretravel, scale-x, scale-y, squareness-xy, block-setup.
 """
 
 import csv
@@ -18,6 +18,9 @@ EFFECTS = {
     "location-b": ["EX0B", "EZ0B", "EA0B", "EC0B"],
     "location-c": ["EX0C", "EY0C", "EA0C", "EB0C"],
     "pretravel": ["pretravel"],
+    "scale-x": ["EXX"],
+    "scale-y": ["EYY"],
+    "squareness-xy": ["EC0Y"],
 }
 RANK_TOLERANCE = 1e-9
 
@@ -37,7 +40,7 @@ def load(study_path):
                     continue
                 t = planned[int(row["id"])]
                 block = blocks[t["block"]]
-                label = f"{plan['mounting']}/{block['name']}"
+                label = f"{entry.get('mounting', plan['mounting'])}/{block['name']}"
                 index, *_ = set_ups.setdefault(label, (len(set_ups), block["carrier"] == "C", block["centre"]))
                 measured.append([float(row[k]) for k in "XYZBC"])
                 n = t["nominal"]
