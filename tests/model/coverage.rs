@@ -17,6 +17,25 @@ fn uncertainties_are_those_of_the_errors() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Index positions that scatter twice as far as declared, on plans without revisits: intervals stay wide enough. With a declared value
+/// that counts four times as much, they hold 91 % on the first plan.
+#[test]
+fn a_scatter_that_is_declared_too_small_leaves_intervals_wide_enough() {
+    let twice = |case: &coverage::Case| case.tau_mm > 0.5e-3 && case.declared_tau_mm.is_some_and(|mm| mm < 0.5e-3);
+    let cases: Vec<coverage::Case> =
+        coverage::scatters().into_iter().filter(twice).filter(|case| case.programs != ["full"]).collect();
+    assert_eq!(cases.len(), 2);
+    for case in &cases {
+        let summary = coverage::run(case, 600, 0, 20);
+        assert!(summary.shown_um.is_some(), "{case:?}: the residuals say nothing of the scatter");
+        let results = summary.rows.iter().filter(|row| !row.name.contains('@') && row.name != "pretravel");
+        let covered: Vec<f64> = results.map(|row| row.covered).collect();
+        let mean = covered.iter().sum::<f64>() / covered.len() as f64;
+        println!("{} {:?}: {:.2} % of {}", case.machine, case.programs, 100.0 * mean, covered.len());
+        assert!((0.93..=0.97).contains(&mean), "{case:?}: covered in {:.2} %", 100.0 * mean);
+    }
+}
+
 /// The bounds of all cases together have teeth: the same runs with intervals a twentieth too narrow or too wide are refused.
 #[test]
 fn intervals_a_twentieth_off_are_refused() {
