@@ -33,8 +33,12 @@ impl Whole {
         Self { source: source(program.name(), text), files }
     }
 
-    /// A finding in its own file.
-    pub fn told(&self, mut finding: Finding) -> Finding {
+    /// Findings, each with its place in its own file.
+    pub fn each_in_its_file(&self, findings: Vec<Finding>) -> Vec<Finding> {
+        findings.into_iter().map(|finding| self.in_its_file(finding)).collect()
+    }
+
+    fn in_its_file(&self, mut finding: Finding) -> Finding {
         let Some(span) = finding.span.clone() else { return finding };
         let is_whole = finding.source.as_ref().is_some_and(|s| std::sync::Arc::ptr_eq(s, &self.source));
         let holds = |(range, _): &&(Range<usize>, Source)| span.start >= range.start && span.start <= range.end;

@@ -112,10 +112,10 @@ pub fn check(machine: &Machine, post: &Postprocessor, source: &Source, against: 
     let whole = called::Whole::new(source, post, against.beside);
     match check_whole(machine, post, &whole.source, against) {
         Ok(mut checked) => {
-            checked.findings = checked.findings.into_iter().map(|finding| whole.told(finding)).collect();
+            checked.findings = whole.each_in_its_file(checked.findings);
             Ok(checked)
         }
-        Err(Failure(findings)) => Err(Failure(findings.into_iter().map(|finding| whole.told(finding)).collect())),
+        Err(Failure(findings)) => Err(Failure(whole.each_in_its_file(findings))),
     }
 }
 
@@ -238,11 +238,14 @@ fn number(post: &Postprocessor, program: &runs::Program, source: &Source) -> Res
 /// Is a text a program of the control's dialect, as far as the grammar says?
 ///
 /// # Errors
-/// The first place that is not of the grammar.
+/// The first place that is not of the grammar, in the file where it stands.
 pub fn grammar(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> Result<()> {
     let whole = called::Whole::new(source, post, beside);
-    let foreign = refuse_unknown(read(post, &whole.source, beside)?.unknown_of_grammar(), &whole.source)?;
-    if foreign.is_empty() { Ok(()) } else { Err(Failure(foreign)) }
+    let read_whole = || {
+        let foreign = refuse_unknown(read(post, &whole.source, beside)?.unknown_of_grammar(), &whole.source)?;
+        if foreign.is_empty() { Ok(()) } else { Err(Failure(foreign)) }
+    };
+    read_whole().map_err(|Failure(findings)| Failure(whole.each_in_its_file(findings)))
 }
 
 fn read(post: &Postprocessor, source: &Source, beside: &[(String, Source)]) -> Result<runs::Program> {
