@@ -70,7 +70,8 @@ fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
         });
     }
     out.extend(not_used(d));
-    if !d.needs_temperature.is_empty() {
+    // an adequate model says it beside the verdict
+    if !d.needs_temperature.is_empty() && d.verdict != Verdict::Adequate {
         out.push(format!("cannot be measured without temperatures in the log: {}", d.needs_temperature.join(", ")));
     }
     let unseen: Vec<&str> =

@@ -273,15 +273,31 @@ fn answer(d: &Diagnosis, fit: &Fit) -> String {
 
 fn adequate(d: &Diagnosis) -> String {
     let fits = format!("The model is complete as far as these touches can measure: {}.", against(d));
+    format!("{fits}{}{}", tested(d), without_temperature(d))
+}
+
+/// A warm room looks like scatter of the index positions where few of them are measured: that the log lacks the temperature is
+/// said beside the verdict.
+fn without_temperature(d: &Diagnosis) -> String {
+    match &d.needs_temperature[..] {
+        [] => String::new(),
+        effects => format!(
+            " No touch has a temperature, so effects of the room cannot be tested ({}). Log the temperature.",
+            effects.join(", ")
+        ),
+    }
+}
+
+fn tested(d: &Diagnosis) -> String {
     if d.power.is_empty() {
-        return fits;
+        return String::new();
     }
     let unseen = match d.not_seen.len() {
         0 => String::new(),
         1 => "; 1 more has no effect on these touches".to_owned(),
         n => format!("; {n} more have no effect on these touches"),
     };
-    format!("{fits} {} effects were tested{unseen}.", d.tested)
+    format!(" {} effects were tested{unseen}.", d.tested)
 }
 
 fn missing_effect(d: &Diagnosis, missing: &Missing) -> String {

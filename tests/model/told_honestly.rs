@@ -104,6 +104,22 @@ fn time_is_not_named_alone_where_the_room_was_not_logged() {
     assert!(blind.says.contains("the room's temperature"), "{}", blind.says);
 }
 
+/// Without temperatures a complete model is complete except for the room: the verdict says which effects that leaves open.
+#[test]
+fn an_adequate_model_says_that_the_room_was_not_logged() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "full");
+    let text = "seed = 4\n[noise]\ntouch_um = 1.0\n[temperature]\nprofile = [[0.0, 20.0], [2.0, 23.5]]\n";
+    let mut touches = touch(&machine, &plan, &scenario(&machine, text), None);
+    let logged = diagnosed(&machine, &plan, &touches);
+    assert_eq!(logged.verdict, Verdict::Adequate);
+    assert!(!logged.says.contains("temperature"), "{}", logged.says);
+    touches.iter_mut().for_each(|t| t.temperature_deg_c = None);
+    let blind = diagnosed(&machine, &plan, &touches);
+    assert_eq!(blind.verdict, Verdict::Adequate);
+    assert!(blind.says.contains("ambient-bending") && blind.says.contains("Log the temperature."), "{}", blind.says);
+}
+
 /// 20 °C in the middle of a warm hour would be a jump that nothing made.
 #[test]
 fn gaps_in_the_temperatures_are_filled_or_said() {
