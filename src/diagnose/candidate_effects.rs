@@ -179,20 +179,20 @@ impl Maker<'_> {
 
     /// Which of the values of effect number i explains most, and how much.
     fn best_of(&self, (i, which): (usize, usize), tried: &[Tried]) -> Option<(usize, f64)> {
-        let mut library = Library::new(self.evidence.n_rows());
-        if Library::keeps(self.evidence.n_rows()) {
-            library.push_scan("tried", Origin::Catalogue, tried.iter().map(|t| (t.value, &t.white)), 1);
+        let n = self.source.sizes(i).count();
+        let n_rows = self.evidence.n_rows();
+        let mut library = if Library::keeps(n_rows) {
+            Library::of_matrices(n_rows, tried.iter().map(|t| &t.white))
         } else {
-            let n = self.source.sizes(i).count();
             let chosen = |t: &Tried| {
                 let chosen = Chosen { effect: i, shape: Some((which, t.value)) };
                 (0..n).map(move |k| (chosen, k))
             };
             let all: Vec<(Chosen, usize)> = tried.iter().flat_map(chosen).collect();
-            library = Library::made(self.evidence.n_rows(), all.len(), self.source.make(all));
-            let variant = |(k, t): (usize, &Tried)| search::Variant { shape: t.value, columns: k * n..(k + 1) * n };
-            library.place("tried", Origin::Catalogue, tried.iter().enumerate().map(variant).collect(), 1);
-        }
+            Library::made(n_rows, all.len(), self.source.make(all))
+        };
+        let variant = |(k, t): (usize, &Tried)| search::Variant { shape: t.value, columns: k * n..(k + 1) * n };
+        library.place("tried", Origin::Catalogue, tried.iter().enumerate().map(variant).collect(), 1);
         let score = Search::new(self.evidence.question(), &library).scores.into_iter().next()?;
         Some((score.variant, score.delta_ss))
     }
@@ -300,8 +300,7 @@ impl<'c> Named<'c> {
         };
         let each = || tried.iter().enumerate().flat_map(|(i, (which, all))| all.iter().map(move |t| (i, *which, t)));
         let mut library = if kept {
-            let data = each().flat_map(|(_, _, t)| t.white.as_slice()).copied().collect();
-            Library::kept(evidence.n_rows(), data)
+            Library::of_matrices(evidence.n_rows(), tried.iter().flat_map(|(_, all)| all).map(|t| &t.white))
         } else {
             let all: Vec<(Chosen, usize)> = each().flat_map(|(i, which, t)| chosen(i, which, t)).collect();
             Library::made(evidence.n_rows(), all.len(), source.make(all))

@@ -75,8 +75,8 @@ const CHUNK_NUMBERS: usize = 2_000_000;
 
 #[derive(Clone)]
 enum Columns {
-    /// In memory, one after the other.
-    Kept(Vec<f64>),
+    /// In memory, one after the other; libraries of the same columns share them.
+    Kept(Arc<Vec<f64>>),
     /// Nowhere: made when they are needed. Those of which nothing is left but rounding are zero; which these are is known once
     /// a whole column has been made.
     Made { make: Make, numbers: Vec<usize>, nothing: Vec<OnceLock<bool>> },
@@ -125,8 +125,16 @@ impl Library {
         const COLUMNS_AT_ONCE: usize = 64;
         data.par_chunks_mut((COLUMNS_AT_ONCE * n_rows).max(1)).for_each(|some| clear_rounding(some, n_rows));
         let count = data.len().checked_div(n_rows).unwrap_or(0);
-        let part = Part { span: 0..count, columns: Columns::Kept(data) };
+        let part = Part { span: 0..count, columns: Columns::Kept(Arc::new(data)) };
         Self { n_rows, parts: vec![part], candidates: Vec::new() }
+    }
+
+    /// The same of matrices one after the other.
+    #[must_use]
+    pub fn of_matrices<'a>(n_rows: usize, matrices: impl Iterator<Item = &'a DMatrix<f64>> + Clone) -> Self {
+        let mut data = Vec::with_capacity(matrices.clone().map(DMatrix::len).sum());
+        matrices.for_each(|columns| data.extend_from_slice(columns.as_slice()));
+        Self::kept(n_rows, data)
     }
 
     /// A library of columns that are made when they are needed: many touches have more of them than memory holds.
@@ -175,9 +183,10 @@ impl Library {
         let first = self.n_columns();
         let span = first..first + columns.ncols();
         if !matches!(self.parts.last(), Some(Part { columns: Columns::Kept(_), .. })) {
-            self.parts.push(Part { span: first..first, columns: Columns::Kept(Vec::new()) });
+            self.parts.push(Part { span: first..first, columns: Columns::Kept(Arc::default()) });
         }
         if let Some(Part { span: all, columns: Columns::Kept(data) }) = self.parts.last_mut() {
+            let data = Arc::make_mut(data);
             let from = data.len();
             data.extend_from_slice(columns.as_slice());
             clear_rounding(&mut data[from..], self.n_rows);
@@ -311,8 +320,7 @@ impl Library {
     /// The same candidates with columns that were whitened otherwise, variant by variant.
     #[must_use]
     pub fn with_variants(&self, n_rows: usize, columns: &[DMatrix<f64>]) -> Self {
-        let data = columns.iter().flat_map(|c| c.as_slice()).copied().collect();
-        Self { candidates: self.candidates.clone(), ..Self::kept(n_rows, data) }
+        Self { candidates: self.candidates.clone(), ..Self::of_matrices(n_rows, columns.iter()) }
     }
 
     /// The same candidates in a regression whose rows a change makes of this one's; `None` where columns are not kept in memory.
@@ -322,7 +330,7 @@ impl Library {
             Columns::Kept(data) => {
                 let mut columns = DMatrix::from_column_slice(self.n_rows, part.span.len(), data);
                 change(&mut columns);
-                Some(Part { span: part.span.clone(), columns: Columns::Kept(columns.data.into()) })
+                Some(Part { span: part.span.clone(), columns: Columns::Kept(Arc::new(columns.data.into())) })
             }
             Columns::Made { .. } => None,
         };
@@ -334,6 +342,14 @@ impl Library {
     #[must_use]
     pub fn only(&self, candidate: usize) -> Self {
         self.some(|c| c == candidate)
+    }
+
+    /// A library of most of the candidates, by their index: with the columns of the others, which no test asks for.
+    #[must_use]
+    pub fn most(&self, wanted: impl Fn(usize) -> bool) -> Self {
+        let some = self.candidates.iter().enumerate().filter(|(i, _)| wanted(*i));
+        let candidates = some.map(|(_, candidate)| candidate.clone()).collect();
+        Self { n_rows: self.n_rows, parts: self.parts.clone(), candidates }
     }
 
     /// A library of some of the candidates, by their index.

@@ -196,7 +196,7 @@ impl Generics {
     /// The candidates that do not depend on something.
     #[must_use]
     pub fn without(&self, depends_on: &str) -> Library {
-        self.library.some(|c| self.shapes[c].depends_on != depends_on)
+        self.library.most(|c| self.shapes[c].depends_on != depends_on)
     }
 }
 
