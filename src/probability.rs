@@ -68,7 +68,48 @@ pub fn chi2_quantile(p: f64, dof: f64) -> Option<f64> {
     if p.ln() < -690.0 * (0.5 * dof) {
         return Some(0.0);
     }
-    number(Gamma::new(0.5 * dof, 0.5).ok()?.inverse_cdf(p))
+    quantile(&Gamma::new(0.5 * dof, 0.5).ok()?, p, dof)
+}
+
+/// Newton's steps from the approximation of Wilson and Hilferty, within what is known to bracket the quantile: a tenth of the steps
+/// that the library's bisection takes. Where they do not end, the library's.
+fn quantile(of: &Gamma, p: f64, dof: f64) -> Option<f64> {
+    const MOST_STEPS: usize = 40;
+    /// After a step of less than this part of x the next one is rounding.
+    const STEP: f64 = 1e-8;
+    /// Below this x the first term of the probability is as exact as the library.
+    const NEARLY: f64 = 1e-9;
+    let ninth = 2.0 / (9.0 * dof);
+    // P(χ² ≤ x) < (x/2)^(dof/2) / Γ(dof/2 + 1), and nearly so where x is small
+    let mut low = 2.0 * ((p.ln() + ln_gamma(0.5 * dof + 1.0)) / (0.5 * dof)).exp();
+    if low < NEARLY {
+        return number(low);
+    }
+    let mut high = f64::INFINITY;
+    let z = Normal::standard().inverse_cdf(p.min(1.0 - LEAST_TAIL));
+    let mut x = if p < LEAST_TAIL { low } else { (dof * (1.0 - ninth + z * ninth.sqrt()).powi(3)).max(low) };
+    for _ in 0..MOST_STEPS {
+        // the smaller tail has more digits
+        let beyond = if p < 0.5 { of.cdf(x) - p } else { (1.0 - p) - of.sf(x) };
+        if beyond > 0.0 {
+            high = x;
+        } else {
+            low = x;
+        }
+        let newton = x - beyond / of.pdf(x);
+        let next = if newton > low && newton < high {
+            newton
+        } else if high.is_finite() {
+            0.5 * (low + high)
+        } else {
+            2.0 * x
+        };
+        if (next - x).abs() <= STEP * x {
+            return number(next);
+        }
+        x = next;
+    }
+    number(of.inverse_cdf(p))
 }
 
 /// P(F ≤ x).
@@ -175,6 +216,19 @@ mod tests {
         assert!((quantile(below) - quantile(above)).abs() < 1e-3, "{} {}", quantile(below), quantile(above));
         assert!((t_sf(2.0, below).unwrap() - t_sf(2.0, above).unwrap()).abs() < 1e-6);
         assert!((f_sf(1.5, 4.0, below).unwrap() - f_sf(1.5, 4.0, above).unwrap()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn quantiles_have_their_probability() {
+        for dof in [0.3, 1.0, 2.0, 3.0, 4.0, 7.0, 12.5, 60.0, 4000.0] {
+            for p in [1e-200, 1e-12, 1e-6, 1e-3, 0.1, 0.45, 0.5, 0.9, 0.999, 1.0 - 1e-9] {
+                let x = chi2_quantile(p, dof).unwrap();
+                let (at, tail) = (chi2_cdf(x, dof).unwrap(), chi2_sf(x, dof).unwrap());
+                let close = (at / p - 1.0).abs() < 1e-9 && (p < 0.5 || (tail / (1.0 - p) - 1.0).abs() < 1e-6);
+                assert!(close || x == 0.0, "{dof} {p}: {x} {at} {tail}");
+                assert!(x > 0.0 || p < 1e-100, "{dof} {p}");
+            }
+        }
     }
 
     /// Every function with every kind of number: an answer between 0 and 1, a quantile of at least 0, or none.

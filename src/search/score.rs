@@ -6,6 +6,7 @@ use super::library::{Library, Origin};
 use super::moments::{Block, Moments};
 use super::multiplicity::{self, Family};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 
 /// A variance of the touches that does not rest on the model, in units of the variance used for whitening.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -200,101 +201,108 @@ pub(super) fn leader(scores: &[Score], library: &Library, generic: bool) -> Opti
 
 /// All score tests from inner products.
 pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError>) -> Vec<Score> {
+    let mut variants = 0;
+    let first: Vec<usize> = library
+        .candidates()
+        .iter()
+        .map(|candidate| {
+            variants += candidate.variants.len();
+            variants - candidate.variants.len()
+        })
+        .collect();
+    let mut scores: Vec<Score> =
+        first.par_iter().enumerate().map(|(c, first)| score_of(moments, library, pure, (c, *first))).collect();
+    multiplicity::adjust(&mut scores, |s| family(library, s.candidate));
+    scores
+}
+
+/// The score test of a candidate; its variants are those from `first` on.
+fn score_of(moments: &Moments, library: &Library, pure: Option<PureError>, (c, first): (usize, usize)) -> Score {
     let (pure_ss, pure_dof) = match pure {
         Some(e) if !e.within => (e.variance * e.dof, e.dof),
         _ => (0.0, 0.0),
     };
     let free = moments.n as f64 - moments.p as f64 + pure_dof;
     let total = moments.rr + pure_ss;
-    let mut index = 0;
-    let mut scores: Vec<Score> = Vec::with_capacity(library.candidates().len());
-    for (c, candidate) in library.candidates().iter().enumerate() {
-        let n_scanned = if candidate.variants.len() > 1 { candidate.n_scanned } else { 0 };
-        let mut scan = Vec::with_capacity(candidate.variants.len());
-        let mut ln_left = Vec::with_capacity(candidate.variants.len());
-        let mut ln_each = Vec::with_capacity(candidate.variants.len());
-        let mut best: Option<(usize, Block, DVector<f64>, f64)> = None;
-        for (v, variant) in candidate.variants.iter().enumerate() {
-            let block = moments.block(index, variant.columns.start);
-            index += 1;
-            let q = block.rank();
-            let dof = free - (q + n_scanned) as f64;
-            if q == 0 || dof < 1.0 {
-                scan.push(0.0);
-                ln_left.push(f64::INFINITY);
-                continue;
-            }
-            let along = block.whitener.tr_mul(&moments.jr.rows(variant.columns.start, variant.columns.len()));
-            // rounding may take away more than there is
-            let delta = along.norm_squared().min(moments.rr);
-            let ln_p = ln_p_of_f(delta, q as f64, held_against(pure, total - delta, dof), dof);
-            scan.push(delta);
-            ln_left.push(block.ln_det());
-            ln_each.push(ln_p);
-            // of values that these touches cannot tell apart the first stands, and not the one that rounding favours
-            const ROUNDING: f64 = 1e-9;
-            if best.as_ref().is_none_or(|b| ln_p < b.3 - ROUNDING * b.3.abs().max(1.0)) {
-                best = Some((v, block, along, ln_p));
-            }
+    let candidate = &library.candidates()[c];
+    let n_scanned = if candidate.variants.len() > 1 { candidate.n_scanned } else { 0 };
+    let mut scan = Vec::with_capacity(candidate.variants.len());
+    let mut ln_left = Vec::with_capacity(candidate.variants.len());
+    let mut ln_each = Vec::with_capacity(candidate.variants.len());
+    let mut best: Option<(usize, Block, DVector<f64>, f64)> = None;
+    for (v, variant) in candidate.variants.iter().enumerate() {
+        let block = moments.block(first + v, variant.columns.start);
+        let q = block.rank();
+        let dof = free - (q + n_scanned) as f64;
+        if q == 0 || dof < 1.0 {
+            scan.push(0.0);
+            ln_left.push(f64::INFINITY);
+            continue;
         }
-        scores.push(match best {
-            Some((variant, block, along, ln_best)) => {
-                let q = block.rank();
-                let delta_ss = along.norm_squared().min(moments.rr);
-                let dof = free - (q + n_scanned) as f64;
-                let rest = held_against(pure, total - delta_ss, dof);
-                let variance = rest / dof;
-                // a scanned shape is a parameter, and a long scan is bounded besides
-                let ln_p = if n_scanned > 0 {
-                    let counted = ln_p_of_f(delta_ss, (q + n_scanned) as f64, rest, dof);
-                    counted.max(ln_p_of_scan(&ln_each, q))
-                } else {
-                    ln_p_of_scan(&ln_each, q)
-                };
-                Score {
-                    candidate: c,
-                    variant,
-                    q,
-                    n_parameters: q + n_scanned,
-                    delta_ss,
-                    f: delta_ss / q as f64 / variance,
-                    dof,
-                    ln_p: if ln_best == f64::NEG_INFINITY { ln_best } else { ln_p },
-                    p: ln_p.exp(),
-                    p_adjusted: 1.0,
-                    estimate: -(&block.whitener * &along),
-                    covariance: &block.whitener * block.whitener.transpose() * variance,
-                    kept: block.kept,
-                    noncentrality: (delta_ss / variance - q as f64).max(0.0),
-                    scan,
-                    ln_left,
-                }
-            }
-            None => {
-                let m = candidate.variants[0].columns.len();
-                Score {
-                    candidate: c,
-                    variant: 0,
-                    q: 0,
-                    n_parameters: 0,
-                    delta_ss: 0.0,
-                    f: 0.0,
-                    dof: free,
-                    ln_p: 0.0,
-                    p: 1.0,
-                    p_adjusted: 1.0,
-                    estimate: DVector::zeros(m),
-                    covariance: DMatrix::zeros(m, m),
-                    kept: 0.0,
-                    noncentrality: 0.0,
-                    scan,
-                    ln_left,
-                }
-            }
-        });
+        let along = block.whitener.tr_mul(&moments.jr.rows(variant.columns.start, variant.columns.len()));
+        // rounding may take away more than there is
+        let delta = along.norm_squared().min(moments.rr);
+        let ln_p = ln_p_of_f(delta, q as f64, held_against(pure, total - delta, dof), dof);
+        scan.push(delta);
+        ln_left.push(block.ln_det());
+        ln_each.push(ln_p);
+        // of values that these touches cannot tell apart the first stands, and not the one that rounding favours
+        const ROUNDING: f64 = 1e-9;
+        if best.as_ref().is_none_or(|b| ln_p < b.3 - ROUNDING * b.3.abs().max(1.0)) {
+            best = Some((v, block, along, ln_p));
+        }
     }
-    multiplicity::adjust(&mut scores, |s| family(library, s.candidate));
-    scores
+    let Some((variant, block, along, ln_best)) = best else {
+        let m = candidate.variants[0].columns.len();
+        return Score {
+            candidate: c,
+            variant: 0,
+            q: 0,
+            n_parameters: 0,
+            delta_ss: 0.0,
+            f: 0.0,
+            dof: free,
+            ln_p: 0.0,
+            p: 1.0,
+            p_adjusted: 1.0,
+            estimate: DVector::zeros(m),
+            covariance: DMatrix::zeros(m, m),
+            kept: 0.0,
+            noncentrality: 0.0,
+            scan,
+            ln_left,
+        };
+    };
+    let q = block.rank();
+    let delta_ss = along.norm_squared().min(moments.rr);
+    let dof = free - (q + n_scanned) as f64;
+    let rest = held_against(pure, total - delta_ss, dof);
+    let variance = rest / dof;
+    // a scanned shape is a parameter, and a long scan is bounded besides
+    let ln_p = if n_scanned > 0 {
+        let counted = ln_p_of_f(delta_ss, (q + n_scanned) as f64, rest, dof);
+        counted.max(ln_p_of_scan(&ln_each, q))
+    } else {
+        ln_p_of_scan(&ln_each, q)
+    };
+    Score {
+        candidate: c,
+        variant,
+        q,
+        n_parameters: q + n_scanned,
+        delta_ss,
+        f: delta_ss / q as f64 / variance,
+        dof,
+        ln_p: if ln_best == f64::NEG_INFINITY { ln_best } else { ln_p },
+        p: ln_p.exp(),
+        p_adjusted: 1.0,
+        estimate: -(&block.whitener * &along),
+        covariance: &block.whitener * block.whitener.transpose() * variance,
+        kept: block.kept,
+        noncentrality: (delta_ss / variance - q as f64).max(0.0),
+        scan,
+        ln_left,
+    }
 }
 
 /// The family of tests that a candidate belongs to.
