@@ -36,7 +36,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         io.say(format!("cannot be determined: {}", u.says));
     }
     if !comparison.explained_by_noise || !found.depends.is_empty() {
-        io.say_as_it_is(format!("next: axiscal diagnose {}", super::next::quoted(&args.study)));
+        io.say_as_it_is(format!("next: axiscal diagnose {}", crate::words::command::quoted_path(&args.study)));
     }
     io.answer(&comparison);
     Ok(of_fit(&fit.outcome, Answer::Done, io))

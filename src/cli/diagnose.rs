@@ -32,7 +32,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let fit = loaded.fit(&settings)?;
     let found = loaded.diagnose(&settings, &fit, &Options { at_most: args.at_most.max(1), ..Options::default() })?;
     io.say(crate::report::diagnosis::diagnosis(&found, io.paper(args.ascii), args.verbose).trim_end());
-    super::next::lines(&found, &loaded).iter().for_each(|line| io.say_as_it_is(line));
+    crate::words::next_calls::lines(&found, &loaded).iter().for_each(|line| io.say_as_it_is(line));
     io.answer(&found);
     Ok(of_fit(&fit.outcome, if found.verdict.is_no() { Answer::No } else { Answer::Done }, io))
 }

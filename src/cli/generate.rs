@@ -148,7 +148,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         ));
     }
     if mounted.is_some() {
-        let file = super::next::quoted(&args.out.join(MACHINES));
+        let file = crate::words::command::quoted_path(&args.out.join(MACHINES));
         io.say(format!("the machine with its artefact: add --machines {file} to further calls"));
     }
     if post.dry_run_mm > 0.0 {

@@ -63,7 +63,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         crate::report::lay::lay(&mut t, io.paper(false).width, &[]);
         io.say(io.paper(false).plain(t.to_string()));
     }
-    io.say_as_it_is(format!("next: axiscal diagnose {}", super::next::quoted(&args.study)));
+    io.say_as_it_is(format!("next: axiscal diagnose {}", crate::words::command::quoted_path(&args.study)));
     Ok(of_fit(&outcome, Answer::Done, io))
 }
 

@@ -21,7 +21,6 @@ mod guard;
 mod identify;
 mod machines;
 mod new;
-mod next;
 mod parse;
 mod plan_next;
 mod programs;

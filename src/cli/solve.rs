@@ -10,10 +10,10 @@ use crate::diagnose::answer::{Candidate, Diagnosis};
 use crate::diagnose::solving::{Added, Change, Ending, Host, Refusal, State, Stop, Visited, Why};
 use crate::fit::Fit;
 use crate::fit::outcome::{Outcome, Parameter};
-use crate::report::diagnosis::wrong_sign;
 use crate::report::fit::{digits, first_remarks, significant, with_unit};
 use crate::search::groups::PLAUSIBLE;
 use crate::words::diagnose::{list, machine_check, one_of};
+use crate::words::diagnosis_remarks::wrong_sign;
 use crate::workflow::change::Edit;
 use crate::workflow::{Loaded, load_study};
 use serde::Serialize;
@@ -215,11 +215,11 @@ fn stopped(stop: &Stop, added: &[&str], loaded: &Loaded) -> String {
         Stop::InQuestion(first) => format!(
             "{} passes the test{beside}, but unused measurements do not confirm it: {add}`{}` looks for touches that decide",
             one_of(&first.effect, &first.same_as),
-            super::next::plan_next(loaded)
+            crate::words::next_calls::plan_next(loaded)
         ),
         Stop::Sketchable => format!(
             "no known effect explains the rest{beside}: {add}`{}` writes its curve as a formula",
-            super::next::sketch_effect(loaded)
+            crate::words::next_calls::sketch_effect(loaded)
         ),
         Stop::Unexplained(check) => format!("no known effect explains the rest{beside}: {}", machine_check(check)),
         Stop::TooLittleData => "too few touches to judge".to_owned(),
@@ -353,7 +353,7 @@ fn beside(added: &[&str], loaded: &Loaded) -> (String, String) {
     if added.is_empty() {
         return (String::new(), String::new());
     }
-    let study = super::next::quoted(&loaded.path);
+    let study = crate::words::command::quoted_path(&loaded.path);
     (format!(" beside {}", added.join(", ")), format!("`axiscal add {study} {}` and then ", added.join(" ")))
 }
 
@@ -437,7 +437,7 @@ fn tell(s: &Solution, fit: &Fit, loaded: &Loaded, (mistaken, verbose): (bool, bo
     // a further program is asked for the names themselves: the study holds one of them by now
     for step in s.steps.iter().filter(|step| !step.same_as.is_empty() && !step.never_parted) {
         let asked: Vec<&str> = std::iter::once(&step.added).chain(&step.same_as).map(String::as_str).collect();
-        io.say_as_it_is(format!("next: {}", super::next::plan_next_for(loaded, &asked)));
+        io.say_as_it_is(format!("next: {}", crate::words::next_calls::plan_next_for(loaded, &asked)));
     }
-    io.say_as_it_is(format!("next: axiscal history {}", super::next::quoted(&loaded.path)));
+    io.say_as_it_is(format!("next: axiscal history {}", crate::words::command::quoted_path(&loaded.path)));
 }

@@ -25,7 +25,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     io.say(report::ladder::verification(&answer, io.paper(false)));
     for (lacks, effects) in [(&after, &answer.only_before), (&before, &answer.only_after)] {
         if !effects.is_empty() {
-            let study = super::next::quoted(&lacks.path);
+            let study = crate::words::command::quoted_path(&lacks.path);
             io.say_as_it_is(format!("next: axiscal add {study} {}", effects.join(" ")));
         }
     }

@@ -33,6 +33,7 @@ use crate::diag::{Failure, Finding, Result, source};
 use as_written::{BlockNumbers, Coordinates, EndOfLine, Padding, Role};
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::OnceLock;
 
 /// The postprocessors that are built in: file name, text.
 pub const BUILT_IN: [(&str, &str); 7] = [
@@ -287,19 +288,32 @@ impl Postprocessor {
     /// # Errors
     /// Never for the files that are shipped: a test reads them all.
     pub fn built_in() -> Result<Vec<Self>> {
-        BUILT_IN.iter().map(|(file, text)| Self::built_in_file(file, text)).collect()
+        (0..BUILT_IN.len()).map(|file| Self::built_in_file(file).cloned()).collect()
     }
 
-    fn built_in_file(file: &str, text: &str) -> Result<Self> {
-        parse(&source(format!("postprocessors/{file} (built in)"), text)).map(|(post, _)| post)
+    /// A built-in one by its place; its file is read once.
+    fn built_in_file(place: usize) -> Result<&'static Self> {
+        static READ: [OnceLock<Result<Postprocessor>>; BUILT_IN.len()] = [const { OnceLock::new() }; BUILT_IN.len()];
+        let (file, text) = BUILT_IN[place];
+        let read = || parse(&source(format!("postprocessors/{file} (built in)"), text)).map(|(post, _)| post);
+        READ[place].get_or_init(read).as_ref().map_err(Clone::clone)
+    }
+
+    /// The place of a built-in one.
+    fn place_of(name: &str) -> Option<usize> {
+        BUILT_IN.iter().position(|(file, _)| file.strip_suffix(".toml") == Some(name))
+    }
+
+    /// Can a program be written for a built-in control of this name? Some only read what another program has measured.
+    #[must_use]
+    pub fn is_built_in(name: &str) -> bool {
+        Self::place_of(name).is_some()
     }
 
     /// The tables of a built-in one; none where it has none, or there is none of that name.
     #[must_use]
     pub fn built_in_tables(name: &str) -> Option<&'static tables::Tables> {
-        static ALL: std::sync::OnceLock<Vec<Postprocessor>> = std::sync::OnceLock::new();
-        let all = ALL.get_or_init(|| Self::built_in().unwrap_or_default());
-        all.iter().find(|p| p.name == name)?.tables.as_ref()
+        Self::built_in_file(Self::place_of(name)?).ok()?.tables.as_ref()
     }
 
     /// The postprocessor of a name, or of a file of the user's own when the word ends in `.toml` or holds a `/`.
@@ -313,8 +327,8 @@ impl Postprocessor {
             let text = read(Path::new(word))?;
             return inherit::parse(&source(word, text), &read).map(|(post, findings)| (post, findings.0));
         }
-        if let Some((file, text)) = BUILT_IN.iter().find(|(file, _)| file.strip_suffix(".toml") == Some(word)) {
-            return Ok((Self::built_in_file(file, text)?, Vec::new()));
+        if let Some(place) = Self::place_of(word) {
+            return Ok((Self::built_in_file(place)?.clone(), Vec::new()));
         }
         let names: Vec<&str> = BUILT_IN.iter().filter_map(|(file, _)| file.strip_suffix(".toml")).collect();
         Err(Failure::new("post::unknown", format!("no controller is called {word:?}"))

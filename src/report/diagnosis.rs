@@ -4,9 +4,10 @@ use super::fit::{digits, first_remarks, number, significant, table, unit, with_u
 use super::lay::lay;
 use super::plot::{Paper, axis_label};
 use super::prose::sentence;
-use crate::diagnose::answer::{Candidate, Diagnosis, Outlier, Shape};
+use crate::diagnose::answer::{Candidate, Diagnosis, Shape};
 use crate::diagnose::{Verdict, setup_mistakes};
 use crate::words::diagnose::plain;
+use crate::words::diagnosis_remarks::remarks;
 use comfy_table::Cell;
 
 /// Rows of the small plot.
@@ -14,12 +15,6 @@ const ROWS: usize = 11;
 
 /// Groups of touches that are named below the plot.
 const MOST_NAMED: usize = 6;
-
-/// Effects named with their smallest detectable size.
-const MOST_POWER: usize = 4;
-
-/// More touches than this that come back with the first candidate are said in one line.
-const MOST_ALONE: usize = 4;
 
 /// Columns of the small plot at least and at most.
 const COLUMNS: (usize, usize) = (30, 100);
@@ -52,105 +47,6 @@ pub fn diagnosis(d: &Diagnosis, paper: Paper, verbose: bool) -> String {
     let remarks: Vec<String> = remarks(d, verbose).iter().map(|r| wrapped(r, 2).trim_end().to_owned()).collect();
     out += &first_remarks(&remarks, verbose);
     paper.plain(out)
-}
-
-/// What a reader must know beside the verdict, the most important first.
-fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
-    let mut out: Vec<String> = d.warnings.iter().map(|w| format!("warning: {w}")).collect();
-    // what nothing speaks for is not explained
-    if let Some(first) = d.candidates.first().filter(|c| d.verdict != Verdict::Adequate && c.proposed) {
-        out.extend(of_candidate(first));
-    }
-    for g in d.gross.iter().take(3) {
-        let share = |share: f64| format!("{:.0} %", 100.0 * share);
-        out.push(match (g.in_place, g.agrees) {
-            (Some(of), _) => format!("tried: {}: {} of the touches would be where planned", g.says, share(of)),
-            (_, Some(of)) => format!("tried: {}: {} of the touches would hit or miss as they did", g.says, share(of)),
-            _ => format!("tried: {}: the residual would be {} µm RMS", g.says, significant(g.rms_um)),
-        });
-    }
-    out.extend(not_used(d));
-    // an adequate model says it beside the verdict
-    if !d.needs_temperature.is_empty() && d.verdict != Verdict::Adequate {
-        out.push(format!("cannot be measured without temperatures in the log: {}", d.needs_temperature.join(", ")));
-    }
-    let unseen: Vec<&str> =
-        d.not_seen.iter().filter(|id| !d.needs_temperature.contains(id)).map(String::as_str).collect();
-    if !unseen.is_empty() {
-        out.push(format!("have no effect on these touches at any size: {}", unseen.join(", ")));
-    }
-    let small: Vec<String> = d
-        .power
-        .iter()
-        .take(MOST_POWER)
-        .map(|p| format!("{} below {} µm", p.effect, significant(p.minimal_detectable_um)))
-        .collect();
-    if !small.is_empty() {
-        out.push(format!("too small to be found with these touches: {}", small.join(", ")));
-    }
-    if verbose && let Some(first) = d.depends.first() {
-        out.push(first.says.clone());
-        // they share much of it with the first, and with each other
-        let others: Vec<String> =
-            d.depends[1..].iter().map(|w| format!("{} ({:.0} %)", plain(&w.by), 100.0 * w.share)).collect();
-        if !others.is_empty() {
-            out.push(format!("each taken alone, the residual also depends on: {}", others.join(", ")));
-        }
-    }
-    out
-}
-
-/// What is to be known of the effect that is named.
-fn of_candidate(first: &Candidate) -> Vec<String> {
-    let mut out = Vec::new();
-    if !first.wrong_sign.is_empty() {
-        out.push(wrong_sign(first));
-    }
-    if !first.plausible {
-        out.push(match first.same_as.len() {
-            0 => format!("{} would be unusually large: another effect may look like it", first.effect),
-            _ => format!("{} would be unusually large: check the others of its group first", first.effect),
-        });
-    }
-    for w in &first.weakens {
-        out.push(format!(
-            "{} becomes less certain with {}: {} in place of {}",
-            w.name,
-            first.effect,
-            with_unit(significant(w.sigma_after), &w.unit),
-            with_unit(significant(w.sigma_before), &w.unit)
-        ));
-    }
-    out
-}
-
-/// Touches that are not used. Those of a block that moved, and those that agree with the first candidate, are one finding.
-fn not_used(d: &Diagnosis) -> Vec<String> {
-    let mut out = Vec::new();
-    let moved = |o: &&Outlier| d.verdict.moved_block().is_some_and(|b| b == o.block);
-    let of_block: Vec<&Outlier> = d.outliers.iter().filter(moved).collect();
-    if let (Some(block), Some(first)) = (d.verdict.moved_block(), of_block.first()) {
-        let ids: Vec<String> = of_block.iter().map(|o| o.id.to_string()).collect();
-        out.push(match ids.len() {
-            1 => format!("not used: touch {} of run {}, of block {block} that moved", first.id, first.run),
-            n => format!("not used: {n} touches of block {block} that moved: {}", ids.join(", ")),
-        });
-    }
-    let (back, stay): (Vec<&Outlier>, Vec<&Outlier>) =
-        d.outliers.iter().filter(|o| !moved(o)).partition(|o| o.comes_back);
-    let together = back.len() > MOST_ALONE;
-    if together {
-        let ids: Vec<String> = back.iter().map(|o| format!("{}/{}", o.run, o.id)).collect();
-        let n = ids.len();
-        let says = "that agree with the others once the first candidate is in the model";
-        out.push(format!("not used: {n} touches {says} (run/touch): {}", ids.join(", ")));
-    }
-    for o in stay.into_iter().chain(back.into_iter().filter(|_| !together)) {
-        let back =
-            if o.comes_back { "; it agrees with the others once the first candidate is in the model" } else { "" };
-        out.push(format!("not used: touch {} of run {} ({} {}): {}{back}", o.id, o.run, o.block, o.face, o.reason));
-    }
-    out
 }
 
 /// The table of candidates with their sizes.
@@ -234,15 +130,6 @@ fn to_check(d: &Diagnosis, paper: Paper) -> String {
         out += &wrapped(&format!("  to separate them: {}", first.tell_apart), 4);
     }
     out
-}
-
-/// What a size of the wrong sign means.
-#[must_use]
-pub fn wrong_sign(c: &Candidate) -> String {
-    format!(
-        "{} would be negative, but such an effect is positive: a compensation that is too large, or a part that cools down, would look like this",
-        c.wrong_sign.join(", ")
-    )
 }
 
 /// A p-value.

@@ -4,17 +4,13 @@
 //! Nothing is computed here that a room above could say: [`gather`] takes a fit, its comparison, its diagnosis and its
 //! ladder, and puts beside each other what belongs together, in the words and units that are shown.
 
-mod command;
-mod headline;
 mod machine;
-mod next;
-mod parameters;
+pub(crate) mod parameters;
 pub mod record;
 mod touches;
-mod why;
 
-pub use headline::{Headline, Level};
-pub use next::{Act, Next};
+pub use crate::words::headline::{Headline, Level};
+pub use crate::words::next_steps::{Act, Next};
 pub use parameters::{correlation, results};
 pub use record::View;
 
@@ -28,6 +24,7 @@ use crate::program::plan::Plan;
 use crate::study::tolerance::Tolerance;
 use crate::tables::Correction;
 use crate::units::um_from_mm;
+use crate::words::{command, headline, next_steps};
 use record::{Errors, RunRecord, StudyRecord};
 use std::path::Path;
 
@@ -99,7 +96,7 @@ pub fn verdict_and_steps(m: &Material) -> (Headline, Vec<Next>) {
     let parameters = parameters::parameters(m, m.fit);
     let compensation = parameters::compensation(m);
     let headline = headline::headline(m, &parameters, &compensation);
-    let next = next::next(m, &headline, &parameters, &compensation);
+    let next = next_steps::next(m, &headline, &parameters, &compensation);
     (headline, next)
 }
 

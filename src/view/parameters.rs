@@ -10,7 +10,7 @@ use crate::study::tolerance::Tolerance;
 use crate::tables::correction::left_um;
 
 /// The results of a fit of the study's touches.
-pub(super) fn parameters(m: &Material, fit: &Fit) -> Vec<ParameterRecord> {
+pub(crate) fn parameters(m: &Material, fit: &Fit) -> Vec<ParameterRecord> {
     results(fit, m.catalogue, m.machine, m.tolerance)
 }
 

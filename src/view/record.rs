@@ -3,8 +3,6 @@
 //! Touches stand column by column, because there may be ten thousand of them and the page that holds them is mailed.
 
 use super::ViewMaterial;
-use super::headline::Headline;
-use super::next::Next;
 use crate::compare::Split;
 use crate::compare::model_ladder::{Curve, Kind};
 use crate::diagnose::Diagnosis;
@@ -12,6 +10,8 @@ use crate::fit::outcome::{Combination, Status, Undetermined};
 use crate::machine::Form;
 use crate::study::tolerance::Tolerance;
 use crate::tables::compensation::Term;
+use crate::words::headline::Headline;
+use crate::words::next_steps::Next;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

@@ -63,7 +63,10 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
             match advice {
                 Advice::Says(lines) => lines.iter().for_each(|line| io.say(format!("  {line}"))),
                 Advice::Sketch => {
-                    io.say(format!("  {} writes what is seen as a formula", super::next::sketch_effect(&loaded)));
+                    io.say(format!(
+                        "  {} writes what is seen as a formula",
+                        crate::words::next_calls::sketch_effect(&loaded)
+                    ));
                     io.say("  nothing is written");
                 }
             }

@@ -1,13 +1,13 @@
 //! The verdict in one sentence for somebody who knows machines and not statistics, and what to do next.
 
-use super::Material;
-use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
 use crate::diagnose::answer::Candidate;
 use crate::diagnose::verdict::{Missing, NotNamed, Unexplained};
 use crate::fit::outcome::Status;
 use crate::model::catalogue::Place;
 use crate::units::um_from_mm;
+use crate::view::Material;
+use crate::view::record::{Compensation, Judgement, ParameterRecord};
 use serde::Serialize;
 
 /// How the page is coloured and which sign stands before the sentence.
@@ -27,6 +27,7 @@ pub enum Level {
 pub struct Headline {
     /// Good, act, unknown.
     pub level: Level,
+    /// The answer in one sentence.
     pub sentence: String,
     /// What stands behind it, in a second one.
     pub detail: String,
@@ -35,7 +36,7 @@ pub struct Headline {
 }
 
 /// Three digits that a person reads, µm.
-pub(super) fn um(x: f64) -> String {
+pub(crate) fn um(x: f64) -> String {
     let x = x.abs();
     let digits = if x >= 100.0 {
         0
@@ -68,7 +69,7 @@ fn largest(parameters: &[ParameterRecord], judgement: Judgement) -> Option<&Para
 }
 
 /// How large a result is, as a length where it does one at the tolerance's radius.
-pub(super) fn size(p: &ParameterRecord, m: &Material) -> String {
+pub(crate) fn size(p: &ParameterRecord, m: &Material) -> String {
     let own = || with_sign(p.value, p.sigma, &p.unit);
     match (p.at_radius_um, p.unit.as_str()) {
         (Some(size), "mm" | "um") => signed_um(size),
@@ -87,7 +88,7 @@ fn with_sign(value: f64, sigma: Option<f64>, unit: &str) -> String {
 }
 
 /// The sentence on top of the page.
-pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> Headline {
+pub(crate) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compensation) -> Headline {
     let d = m.diagnosis;
     let errors = || format!("The residual is {}; the probe noise is {}.", um(d.rms_um), um(d.noise_um));
     let (level, sentence, detail) = match &d.verdict {
@@ -129,7 +130,7 @@ pub(super) fn headline(m: &Material, parameters: &[ParameterRecord], c: &Compens
 }
 
 /// The name of an effect.
-pub(super) fn named(m: &Material, id: &str) -> String {
+pub(crate) fn named(m: &Material, id: &str) -> String {
     m.catalogue.get(id, m.machine).map_or_else(|| id.to_owned(), |e| e.name.clone())
 }
 
@@ -148,7 +149,7 @@ fn one_of(m: &Material, open: &[String]) -> String {
 }
 
 /// An effect that passes its test and is not borne out, with those that these touches cannot tell from it.
-pub(super) fn in_question(m: &Material, c: &Candidate) -> String {
+pub(crate) fn in_question(m: &Material, c: &Candidate) -> String {
     match &c.same_as[..] {
         [] => c.name.clone(),
         [one] => format!("{} or {}", c.name, named(m, one)),
@@ -181,7 +182,7 @@ fn is_one_size(c: &Candidate) -> bool {
 
 /// Its parameters with their sizes.
 fn sizes(m: &Material, c: &Candidate) -> Vec<String> {
-    let known = m.proposed.map(|fit| super::parameters::parameters(m, fit)).unwrap_or_default();
+    let known = m.proposed.map(|fit| crate::view::parameters::parameters(m, fit)).unwrap_or_default();
     let those = c.parameters.iter().filter(|p| p.sigma.is_some()).take(2);
     let each = those.map(|p| match known.iter().find(|r| r.name == p.name && r.sigma.is_some()) {
         Some(record) => format!("{} {}", p.name, size(record, m)),
@@ -293,7 +294,7 @@ fn all(n: usize) -> String {
 }
 
 /// With a capital letter.
-pub(super) fn capital(text: &str) -> String {
+pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |c| c.to_uppercase().collect::<String>() + letters.as_str())
 }

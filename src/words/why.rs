@@ -1,15 +1,15 @@
 //! The grounds of the verdict in three lines: the size of the residual, what was looked for, and what unused measurements
 //! or the tolerance say.
 
-use super::Material;
 use super::headline::{named, um};
-use super::record::{Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
 use crate::diagnose::answer::Candidate;
 use crate::diagnose::verdict::{NotNamed, Unexplained};
+use crate::view::Material;
+use crate::view::record::{Judgement, ParameterRecord};
 
 /// The lines.
-pub(super) fn why(m: &Material, parameters: &[ParameterRecord]) -> Vec<String> {
+pub(crate) fn why(m: &Material, parameters: &[ParameterRecord]) -> Vec<String> {
     let d = m.diagnosis;
     vec![size(m), d.mistake().map_or_else(|| search(m), |mistake| set_up(m, &mistake)), confirmed(m, parameters)]
 }

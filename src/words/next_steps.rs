@@ -1,11 +1,9 @@
 //! What to do next, the first thing first.
 
-use super::Material;
 use super::command::{
     SUPPOSED_CONTROLLER, about_controller, beside_the_study, for_controller, larger_program, quoted, study,
 };
 use super::headline::{Headline, Level, capital, in_question, named, size, um};
-use super::record::{Compensation, Judgement, ParameterRecord};
 use crate::diagnose::Verdict;
 use crate::diagnose::answer::Candidate;
 use crate::diagnose::consequence::Consequence;
@@ -14,11 +12,14 @@ use crate::diagnose::verdict::{NotNamed, Unexplained};
 use crate::post::Postprocessor;
 use crate::tables::control;
 use crate::units::um_from_mm;
+use crate::view::Material;
+use crate::view::record::{Compensation, Judgement, ParameterRecord};
 use serde::Serialize;
 
 /// A thing to do.
 #[derive(Debug, Clone, Serialize)]
 pub struct Next {
+    /// What to do.
     pub what: String,
     /// How, or why.
     pub how: String,
@@ -35,7 +36,10 @@ pub enum Act {
     /// A person does it, at the machine or in the terminal.
     Nothing,
     /// Adds the effect to the model.
-    Add { effect: String },
+    Add {
+        /// Its id.
+        effect: String,
+    },
     /// Writes a program of further touches.
     MeasureMore,
     /// Writes the compensation.
@@ -55,7 +59,7 @@ impl Next {
 }
 
 /// What to do, the first thing first.
-pub(super) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRecord], c: &Compensation) -> Vec<Next> {
+pub(crate) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRecord], c: &Compensation) -> Vec<Next> {
     let mut out = Vec::new();
     let plan_next = format!("axiscal plan-next {} {} --out next", study(m), for_controller(m));
     let about = about_controller(m);
@@ -161,7 +165,7 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
     if !mends.is_empty() {
         out.push(Next::new("How to correct it", format!("{one_of_several}{mends}"), ""));
     }
-    let known = m.proposed.map(|fit| super::parameters::parameters(m, fit)).unwrap_or_default();
+    let known = m.proposed.map(|fit| crate::view::parameters::parameters(m, fit)).unwrap_or_default();
     let beyond = known.iter().filter(|p| p.judgement == Judgement::Beyond);
     let large: Vec<&ParameterRecord> = beyond.filter(|p| p.effect != first.effect && is_carried(c, p)).collect();
     let ratio = |p: &ParameterRecord| p.tolerance.map_or(0.0, |t| p.value.abs() / t);

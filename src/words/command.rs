@@ -1,15 +1,15 @@
 //! Commands that a person copies into a terminal: they run as they are written, in the folder in which the report was
 //! written.
 
-use super::Material;
 use crate::post::Postprocessor;
+use crate::view::Material;
 use std::path::Path;
 
 /// What stands for the control where the touches come from no control's log.
-pub(super) const SUPPOSED_CONTROLLER: &str = "linuxcnc";
+pub(crate) const SUPPOSED_CONTROLLER: &str = "linuxcnc";
 
 /// A word as a shell takes it: POSIX shells, cmd and PowerShell agree on double quotes around spaces.
-pub(super) fn quoted(word: &str) -> String {
+pub(crate) fn quoted(word: &str) -> String {
     let plain = |c: char| c.is_alphanumeric() || "-_./\\:+,=@~".contains(c);
     // what begins with a minus sign would be an option
     let word = if word.starts_with('-') { format!("./{word}") } else { word.to_owned() };
@@ -22,13 +22,18 @@ pub(super) fn quoted(word: &str) -> String {
     format!("\"{word}\"")
 }
 
+/// The same of a path.
+pub(crate) fn quoted_path(path: &Path) -> String {
+    quoted(&path.display().to_string())
+}
+
 /// The path of a file that the study names, as the caller of the program sees it.
-pub(super) fn beside_the_study(m: &Material, name: &str) -> String {
+pub(crate) fn beside_the_study(m: &Material, name: &str) -> String {
     m.path.parent().unwrap_or(Path::new("")).join(name).display().to_string()
 }
 
 /// Where the commands run: their paths begin there.
-pub(super) fn run_in(path: &Path) -> String {
+pub(crate) fn run_in(path: &Path) -> String {
     use std::path::Component;
     match (path.components().next(), path.components().count()) {
         (Some(Component::Normal(file)), 1) => format!("Run the commands in the folder of {}.", file.display()),
@@ -43,32 +48,30 @@ pub(super) fn run_in(path: &Path) -> String {
 }
 
 /// The study.
-pub(super) fn study(m: &Material) -> String {
+pub(crate) fn study(m: &Material) -> String {
     quoted(&m.path.display().to_string())
 }
 
 /// The control that wrote the logs.
-pub(super) fn controller(m: &Material) -> Option<String> {
+pub(crate) fn controller(m: &Material) -> Option<String> {
     let is_file = |word: &str| word.ends_with(".toml") || word.contains('/');
     // others only read what another program has measured, and no program can be written for them
-    let with_programs = Postprocessor::built_in().unwrap_or_default();
-    let named = |word: &str| with_programs.iter().any(|p| p.name == word);
-    let word = m.runs.iter().map(|r| r.controller).find(|c| named(c) || is_file(c))?;
+    let word = m.runs.iter().map(|r| r.controller).find(|c| Postprocessor::is_built_in(c) || is_file(c))?;
     Some(quoted(&if is_file(word) { beside_the_study(m, word) } else { word.to_owned() }))
 }
 
 /// `--controller NAME`.
-pub(super) fn for_controller(m: &Material) -> String {
+pub(crate) fn for_controller(m: &Material) -> String {
     format!("--controller {}", controller(m).unwrap_or_else(|| SUPPOSED_CONTROLLER.to_owned()))
 }
 
 /// What must be said beside a command whose control is only supposed.
-pub(super) fn about_controller(m: &Material) -> &'static str {
+pub(crate) fn about_controller(m: &Material) -> &'static str {
     if controller(m).is_some() { "" } else { " Write the name of your control in place of linuxcnc." }
 }
 
 /// The larger program for the study's machine.
-pub(super) fn larger_program(m: &Material) -> String {
+pub(crate) fn larger_program(m: &Material) -> String {
     let machines = m.machines_file.map_or_else(String::new, |file| {
         let path = beside_the_study(m, file);
         format!(" --machines {}", quoted(&path))

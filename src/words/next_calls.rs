@@ -1,26 +1,19 @@
-//! What to do after a diagnosis. A command is named only where its verb will do something: the same findings decide here
-//! and there.
+//! What to do after a diagnosis, as the terminal prints it. A command is named only where its verb will do something: the same
+//! findings decide here and there.
 
+use super::command::quoted_path as quoted;
+use super::diagnose as words;
 use crate::diagnose::answer::Diagnosis;
 use crate::diagnose::next_step::NextStep;
 use crate::post::Postprocessor;
 use crate::program;
-use crate::words::diagnose as words;
 use crate::workflow::{Disk, Loaded, controller_path};
 use std::path::Path;
-
-/// A path as a shell takes it: in quotes where it has signs that a shell reads.
-#[must_use]
-pub fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_alphanumeric() || "/._-+=:@,~\\".contains(c);
-    if !text.is_empty() && text.chars().all(plain) { text } else { format!("'{}'", text.replace('\'', r"'\''")) }
-}
 
 /// The control that the study's runs were made on, as a call from here names it: the first of them that programs can be
 /// written for.
 #[must_use]
-pub fn controller(loaded: &Loaded) -> Option<String> {
+pub(crate) fn controller(loaded: &Loaded) -> Option<String> {
     let each = loaded.study.data.iter().map(|d| controller_path(&d.controller, loaded.folder(), &Disk::default()));
     let mut each = each.filter(|c| c != "csv");
     each.find(|c| Postprocessor::load_built_in_or_file(c).is_ok())
@@ -37,13 +30,13 @@ fn with_control(loaded: &Loaded, call: impl Fn(&str) -> String) -> String {
 
 /// The call of `plan-next`, with the study's own control.
 #[must_use]
-pub fn plan_next(loaded: &Loaded) -> String {
+pub(crate) fn plan_next(loaded: &Loaded) -> String {
     plan_next_for(loaded, &[])
 }
 
 /// The same for effects that are to be told apart.
 #[must_use]
-pub fn plan_next_for(loaded: &Loaded, effects: &[&str]) -> String {
+pub(crate) fn plan_next_for(loaded: &Loaded, effects: &[&str]) -> String {
     let which = if effects.is_empty() { String::new() } else { format!(" --effects {}", effects.join(",")) };
     let study = quoted(&loaded.path);
     with_control(loaded, |name| format!("axiscal plan-next {study} --out next --controller {name}{which}"))
@@ -61,7 +54,7 @@ fn richer_program(loaded: &Loaded) -> Option<String> {
 
 /// The call of `sketch-effect`.
 #[must_use]
-pub fn sketch_effect(loaded: &Loaded) -> String {
+pub(crate) fn sketch_effect(loaded: &Loaded) -> String {
     format!("axiscal sketch-effect {} --out my-effects.toml", quoted(&loaded.path))
 }
 
@@ -70,7 +63,7 @@ const MOST_IDS: usize = 3;
 
 /// What to do next, the first thing first, each line as it is printed.
 #[must_use]
-pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
+pub(crate) fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
     let study = quoted(&loaded.path);
     let add =
         |effect: &str| format!("  in either case, this removes it from the other errors: axiscal add {study} {effect}");
@@ -112,7 +105,7 @@ pub fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
             std::iter::once(what).chain(sketchable.then(sketch)).collect()
         }
         NextStep::RicherProgram => richer_program(loaded).map(|call| format!("next: {call}")).into_iter().collect(),
-        NextStep::CheckSize(o) => vec![format!("next: {}", crate::words::diagnose::check_size(o))],
+        NextStep::CheckSize(o) => vec![format!("next: {}", words::check_size(o))],
         NextStep::Nothing => Vec::new(),
     }
 }
