@@ -257,7 +257,11 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
         gross.splice(0..0, missed);
     }
-    let mut out = assemble_diagnosis::put_together(subject, &seen, &features, (decision, &beside), gross, options);
+    // what the refit still misses does not depend on the answer
+    let (mut out, remains) = rayon::join(
+        || assemble_diagnosis::put_together(subject, &seen, &features, (decision, &beside), gross, options),
+        || refitted.as_ref().map(|again| still_fails(again, machine, catalogue)),
+    );
     if out.mistake().is_none() {
         let gathered = beside.gathered.is_some();
         out.consequences = consequence::consequences(subject, &seen, &generics, (&out.verdict, gathered))?;
@@ -273,7 +277,7 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         };
         if first.proposed {
             first.rms_after_um = again.outcome.rms_um;
-            first.remains = Some(still_fails(&again, machine, catalogue));
+            first.remains = remains.or_else(|| Some(still_fails(&again, machine, catalogue)));
         }
         assemble_diagnosis::outliers_again(&mut out, fit, &again);
     }

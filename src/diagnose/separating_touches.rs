@@ -16,6 +16,9 @@ use rayon::prelude::*;
 /// A variation tells two effects apart when the diagnosis of its touches does so with this probability.
 const SAFELY: f64 = 0.95;
 
+/// A variation that takes longer is no advice, s.
+const LONGEST_S: f64 = 7200.0;
+
 /// Rivals that are named at most.
 const MOST_NAMED: usize = 4;
 
@@ -159,7 +162,8 @@ fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Separatin
     let rivals: Vec<usize> = group.members.iter().map(|m| m.candidate).filter(|&c| c != chosen).collect();
     let told = |t: &Tried| rivals.iter().filter(|&&r| t.tells(chosen, r)).count();
     // ties go to the earlier, which is the cheaper
-    let best = tried.iter().map(|t| (told(t), t)).rev().max_by_key(|t| t.0);
+    let short = tried.iter().filter(|t| t.seconds <= LONGEST_S);
+    let best = short.map(|t| (told(t), t)).rev().max_by_key(|t| t.0);
     let id = |c: usize| seen.named.effects[c].id.as_str();
     let never = never_parted(group, tried);
     let Some((count, best)) = best.filter(|b| b.0 > 0) else {

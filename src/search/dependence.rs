@@ -8,6 +8,7 @@ use super::pattern_tests::{CONSTANT, Features, Generics, Shape};
 use super::score::{Question, Score, Search};
 use super::shapes::{Function, Grouping};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// Points of a curve.
@@ -127,13 +128,17 @@ pub fn dependences(question: Question, features: &Features, generics: &Generics)
         order.extend(simplest.map(|m| m.candidate));
     }
     order.extend(ranking);
-    let mut out: Vec<Dependence> = Vec::new();
+    let on = |candidate: usize| generics.shapes[candidate].depends_on.as_str();
+    let mut first: Vec<usize> = Vec::new();
     for candidate in order {
-        let shape = &generics.shapes[candidate];
-        if out.iter().all(|d| d.on != shape.depends_on) {
-            out.push(dependence(&search, &search.scores[candidate], shape, features, generics, total));
+        if first.iter().all(|&other| on(other) != on(candidate)) {
+            first.push(candidate);
         }
     }
+    let of = |&candidate: &usize| {
+        dependence(&search, &search.scores[candidate], &generics.shapes[candidate], features, generics, total)
+    };
+    let mut out: Vec<Dependence> = first.par_iter().map(of).collect();
     if let Some(mut score) = same.ranking().first().map(|&c| same.scores[c].clone()) {
         // one family with all the shapes
         let tested = search.scores.iter().filter(|s| s.visible()).count() + library.candidates().len();
