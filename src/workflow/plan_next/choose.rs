@@ -14,8 +14,8 @@ use crate::program::plan::Plan;
 use crate::program::{self, Generated, Options};
 use crate::search::distinguishability::SEEN;
 use crate::workflow::Loaded;
-use std::cell::RefCell;
 use std::collections::BTreeSet;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Rounds of choosing, generating and leaving out what cannot be reached.
 const MOST_ROUNDS: usize = 5;
@@ -76,6 +76,11 @@ impl Chosen {
     }
 }
 
+/// What mountings that are tried at the same time find together.
+pub(super) fn locked<T>(found: &Mutex<T>) -> MutexGuard<'_, T> {
+    found.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 /// The study as a design sees it.
 pub(super) struct Setting<'a> {
     pub task: Task<'a>,
@@ -84,13 +89,13 @@ pub(super) struct Setting<'a> {
     pub known: Vec<Known>,
     pub noise: Noise,
     /// What was left out of the choice because an effect has no value there.
-    pub holes: RefCell<BTreeSet<String>>,
+    pub holes: Mutex<BTreeSet<String>>,
     /// What the room does during the program.
     pub room: Room,
     /// Pairs of questions that a choice is for.
     pub wanted: BTreeSet<usize>,
     /// Pairs that some touches part, on whatever blocks.
-    pub parted: RefCell<BTreeSet<usize>>,
+    pub parted: Mutex<BTreeSet<usize>>,
 }
 
 impl<'a> Setting<'a> {
@@ -119,16 +124,16 @@ impl<'a> Setting<'a> {
             runs,
             known,
             noise,
-            holes: RefCell::default(),
+            holes: Mutex::default(),
             room: Room::GoesOn,
             wanted: BTreeSet::new(),
-            parted: RefCell::default(),
+            parted: Mutex::default(),
         })
     }
 
     /// Pairs that all touches of all blocks together leave as they are, in words.
     pub(super) fn never(&self, questions: &Questions) -> Vec<String> {
-        let parted = self.parted.borrow();
+        let parted = locked(&self.parted);
         let never = questions.pairs.iter().enumerate().filter(|(p, _)| !parted.contains(p));
         never.map(|(_, p)| p.other.as_ref().map_or_else(|| p.one.clone(), |o| format!("{} and {o}", p.one))).collect()
     }
@@ -205,7 +210,7 @@ impl<'a> Setting<'a> {
             let view = self.view(&planned, label, effects)?;
             if !view.left_out.is_empty() {
                 let (left, says) = where_all_have_values(&view, self.n_given(), effects, &pool);
-                self.holes.borrow_mut().extend(says);
+                locked(&self.holes).extend(says);
                 if left.len() == pool.len() {
                     break;
                 }
@@ -216,7 +221,7 @@ impl<'a> Setting<'a> {
             // what all touches of the pool together leave as it is no choice of them parts
             let all: Vec<usize> = (0..pool.len()).collect();
             let hopeless: Vec<bool> = design.separated(&all).iter().map(|s| s.after < NOTHING).collect();
-            self.parted.borrow_mut().extend((0..hopeless.len()).filter(|&p| !hopeless[p]));
+            locked(&self.parted).extend((0..hopeless.len()).filter(|&p| !hopeless[p]));
             let wanted = |p: usize| self.wanted.is_empty() || self.wanted.contains(&p);
             if (0..hopeless.len()).all(|p| hopeless[p] || !wanted(p)) {
                 break;

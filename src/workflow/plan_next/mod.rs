@@ -17,8 +17,9 @@ use crate::fit::candidates::NoValue;
 use crate::fit::{Fit, Settings, effects_of};
 use crate::model::catalogue::{Catalogue, Effect};
 use crate::search::distinguishability::SEEN;
-use choose::{Setting, says};
+use choose::{Setting, locked, says};
 use nalgebra::DVector;
+use rayon::prelude::*;
 
 /// Other blocks are worth the trouble when they part effects so many times better.
 const WORTH_MOVING: f64 = 1.5;
@@ -121,7 +122,7 @@ pub fn plan_next(loaded: &Loaded, request: &Request, env: &dyn Environment) -> R
         });
     }
     let best = best(loaded, &mut setting, &effects, &questions, request, env)?;
-    warn(setting.holes.borrow().iter().cloned(), env);
+    warn(locked(&setting.holes).iter().cloned(), env);
     let never = setting.never(&questions);
     if never.len() == questions.pairs.len() {
         let says = format!(
@@ -320,9 +321,11 @@ fn best(
     }
     let settled = |p: usize| best.as_ref().is_some_and(|b| b.separations[p].most() >= SEEN);
     setting.wanted = (0..questions.pairs.len()).filter(|&p| !settled(p)).collect();
-    let others = loaded.machine.mountings.iter();
-    let others = others.filter_map(|m| setting.choose(m, None, effects, questions, budget_s, name).ok());
-    let better = others.filter(|o| best.as_ref().is_none_or(|b| o.worth() > WORTH_MOVING * b.worth()));
+    let setting = &*setting;
+    let others = loaded.machine.mountings.par_iter();
+    let others: Vec<Chosen> =
+        others.filter_map(|m| setting.choose(m, None, effects, questions, budget_s, name).ok()).collect();
+    let better = others.into_iter().filter(|o| best.as_ref().is_none_or(|b| o.worth() > WORTH_MOVING * b.worth()));
     let Some(other) = better.max_by(|a, b| a.worth().total_cmp(&b.worth())) else { return Ok(best) };
     if request.moved || stands.is_none() {
         return Ok(Some(other));
