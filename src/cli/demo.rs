@@ -58,23 +58,23 @@ const STEPS: [(&str, &str); 17] = [
         "export OUT/study.toml --controller linuxcnc --out OUT/compensation",
     ),
     (
-        "does it work? other points, before ...",
+        "does it work? a program that touches other points",
         "generate --machine trunnion --machines OUT/machines.toml --program OUT/check.toml --controller linuxcnc --out OUT",
     ),
     (
-        "... without the compensation",
+        "run without the compensation",
         "simulate --plan OUT/check.plan.json --machine trunnion --machines OUT/machines.toml --scenario OUT/wrong.toml --controller linuxcnc --out OUT/check-before.log",
     ),
     (
-        "... and with it",
+        "run with the compensation",
         "simulate --plan OUT/check.plan.json --machine trunnion --machines OUT/machines.toml --scenario OUT/wrong.toml --controller linuxcnc --compensation OUT/compensation --out OUT/check-after.log",
     ),
     (
-        "one study for each",
+        "a study for each of the two runs",
         "new --machine trunnion --machines OUT/machines.toml --plan OUT/check.plan.json --log OUT/check-before.log --controller linuxcnc --out OUT/check-before.toml",
     ),
     (
-        "(the control says which compensation was active)",
+        "the second one names the compensation that was active",
         "new --machine trunnion --machines OUT/machines.toml --plan OUT/check.plan.json --log OUT/check-after.log --controller linuxcnc --compensation OUT/compensation --out OUT/check-after.toml",
     ),
     ("before and after, side by side", "verify OUT/check-before.toml OUT/check-after.toml"),

@@ -16,6 +16,9 @@ const N_BINS: usize = 8;
 /// A quantity with at most so many values is not binned.
 const MOST_LEVELS: usize = 24;
 
+/// So many touches a group has on average at least: the points of a sphere are touched once each, and nothing is common to one.
+const LEAST_TOUCHES: usize = 2;
+
 /// Harmonics of a rotary axis that are looked for.
 const ORDERS: usize = 3;
 
@@ -40,7 +43,8 @@ struct Levels {
 pub(super) fn splits(fit: &Fit, points: &[Point], misfit: &Misfit) -> Vec<Split> {
     let mut out = Vec::new();
     let mut add = |by: &str, what: &str, levels: Levels, common: Common, angle_deg: Option<(AxisName, Vec<f64>)>| {
-        if levels.names.len() > 1 {
+        let touches = points.len() / levels.names.len().max(1);
+        if levels.names.len() > 1 && touches >= LEAST_TOUCHES {
             out.push(split(fit, points, misfit, (by, what), &levels, common, angle_deg));
         }
     };
