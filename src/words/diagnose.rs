@@ -282,7 +282,8 @@ fn without_temperature(d: &Diagnosis) -> String {
     match &d.needs_temperature[..] {
         [] => String::new(),
         effects => format!(
-            " No touch has a temperature, so effects of the room cannot be tested ({}). Log the temperature.",
+            " No touch has a temperature, so effects of the room temperature cannot be tested ({}). Keep the room at one \
+             temperature, or add temperatures to the touches (CSV, temperature_degC).",
             effects.join(", ")
         ),
     }
