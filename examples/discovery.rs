@@ -198,7 +198,11 @@ fn of_the_generator(part: &str, count: &dyn Fn(usize) -> usize) {
                     let led = judge::mistake(&bench, mistake, 56);
                     println!(
                         "{} | {} | {} | {}",
-                        if led.led { "led   " } else { "NOT LED" },
+                        match (led.led, led.not_testable) {
+                            (true, _) => "led          ",
+                            (false, true) => "said not testable",
+                            (false, false) => "NOT LED",
+                        },
                         led.bench,
                         led.what,
                         led.said.join("; ")

@@ -71,8 +71,8 @@ pub fn chi2_quantile(p: f64, dof: f64) -> Option<f64> {
     quantile(&Gamma::new(0.5 * dof, 0.5).ok()?, p, dof)
 }
 
-/// Newton's steps from the approximation of Wilson and Hilferty, within what is known to bracket the quantile: a tenth of the steps
-/// that the library's bisection takes. Where they do not end, the library's.
+/// Newton's steps from the approximation of Wilson and Hilferty, within what is known to bracket the quantile: fewer steps than the
+/// library's. Where they do not end, the library's.
 fn quantile(of: &Gamma, p: f64, dof: f64) -> Option<f64> {
     const MOST_STEPS: usize = 40;
     /// After a step of less than this part of x the next one is rounding.
@@ -91,23 +91,26 @@ fn quantile(of: &Gamma, p: f64, dof: f64) -> Option<f64> {
     for _ in 0..MOST_STEPS {
         // the smaller tail has more digits
         let beyond = if p < 0.5 { of.cdf(x) - p } else { (1.0 - p) - of.sf(x) };
+        if beyond == 0.0 {
+            return number(x);
+        }
         if beyond > 0.0 {
             high = x;
         } else {
             low = x;
         }
-        let newton = x - beyond / of.pdf(x);
-        let next = if newton > low && newton < high {
-            newton
+        // by its logarithm: the density itself overflows where there are many degrees of freedom
+        let newton = x - beyond / of.ln_pdf(x).exp();
+        if newton > low && newton < high {
+            if (newton - x).abs() <= STEP * x {
+                return number(newton);
+            }
+            x = newton;
         } else if high.is_finite() {
-            0.5 * (low + high)
+            x = 0.5 * (low + high);
         } else {
-            2.0 * x
-        };
-        if (next - x).abs() <= STEP * x {
-            return number(next);
+            x *= 2.0;
         }
-        x = next;
     }
     number(of.inverse_cdf(p))
 }
@@ -220,11 +223,16 @@ mod tests {
 
     #[test]
     fn quantiles_have_their_probability() {
-        for dof in [0.3, 1.0, 2.0, 3.0, 4.0, 7.0, 12.5, 60.0, 4000.0] {
+        for dof in [0.3, 1.0, 2.0, 3.0, 4.0, 7.0, 12.5, 60.0, 257.0, 280.0, 300.0, 320.0, 4000.0, 1e7] {
             for p in [1e-200, 1e-12, 1e-6, 1e-3, 0.1, 0.45, 0.5, 0.9, 0.999, 1.0 - 1e-9] {
+                // with so many degrees of freedom neither search reaches so small a probability
+                if dof > 1e4 && p < 1e-100 {
+                    continue;
+                }
                 let x = chi2_quantile(p, dof).unwrap();
                 let (at, tail) = (chi2_cdf(x, dof).unwrap(), chi2_sf(x, dof).unwrap());
-                let close = (at / p - 1.0).abs() < 1e-9 && (p < 0.5 || (tail / (1.0 - p) - 1.0).abs() < 1e-6);
+                let near = if dof > 1e4 { 1e-6 } else { 1e-9 };
+                let close = (at / p - 1.0).abs() < near && (p < 0.5 || (tail / (1.0 - p) - 1.0).abs() < 1e-6);
                 assert!(close || x == 0.0, "{dof} {p}: {x} {at} {tail}");
                 assert!(x > 0.0 || p < 1e-100, "{dof} {p}");
             }

@@ -41,8 +41,9 @@ impl Whole {
     fn in_its_file(&self, mut finding: Finding) -> Finding {
         let Some(span) = finding.span.clone() else { return finding };
         let is_whole = finding.source.as_ref().is_some_and(|s| std::sync::Arc::ptr_eq(s, &self.source));
-        let holds = |(range, _): &&(Range<usize>, Source)| span.start >= range.start && span.start <= range.end;
-        if let Some((range, file)) = self.files.iter().find(holds).filter(|_| is_whole) {
+        // where one file ends the next begins
+        let holds = |(range, _): &&(Range<usize>, Source)| span.start >= range.start;
+        if let Some((range, file)) = self.files.iter().rev().find(holds).filter(|_| is_whole) {
             let of_file = |at: usize| at.saturating_sub(range.start).min(range.len());
             finding.span = Some(of_file(span.start)..of_file(span.end));
             finding.source = Some(file.clone());

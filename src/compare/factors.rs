@@ -16,9 +16,6 @@ const N_BINS: usize = 8;
 /// A quantity with at most so many values is not binned.
 const MOST_LEVELS: usize = 24;
 
-/// So many touches a group has on average at least: the points of a sphere are touched once each, and nothing is common to one.
-const LEAST_TOUCHES: usize = 2;
-
 /// Harmonics of a rotary axis that are looked for.
 const ORDERS: usize = 3;
 
@@ -43,8 +40,9 @@ struct Levels {
 pub(super) fn splits(fit: &Fit, points: &[Point], misfit: &Misfit) -> Vec<Split> {
     let mut out = Vec::new();
     let mut add = |by: &str, what: &str, levels: Levels, common: Common, angle_deg: Option<(AxisName, Vec<f64>)>| {
-        let touches = points.len() / levels.names.len().max(1);
-        if levels.names.len() > 1 && touches >= LEAST_TOUCHES {
+        // a group of one touch has nothing in common: the points of a sphere are touched once each
+        let of_one_touch = matches!(common, Common::Residual) && levels.at.iter().all(Option::is_none);
+        if levels.names.len() > 1 && !(of_one_touch && 2 * levels.names.len() > points.len()) {
             out.push(split(fit, points, misfit, (by, what), &levels, common, angle_deg));
         }
     };

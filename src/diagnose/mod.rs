@@ -257,7 +257,7 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
         gross.splice(0..0, missed);
     }
-    // what the refit still misses does not depend on the answer
+    // what the refit still misses is used where the first candidate is proposed, and can be found meanwhile
     let (mut out, remains) = rayon::join(
         || assemble_diagnosis::put_together(subject, &seen, &features, (decision, &beside), gross, options),
         || refitted.as_ref().map(|again| still_fails(again, machine, catalogue)),

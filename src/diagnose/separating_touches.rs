@@ -141,6 +141,10 @@ pub const NEVER: &str = "no touches of this machine separate them: check at the 
 /// What is said where the variations that were tried do not help, and a program of its own may.
 const LOOKED_FOR: &str = "no single change of these touches does; `axiscal plan-next` looks for a program that does";
 
+/// What is said where only variations of more than [`LONGEST_S`] help.
+const ONLY_LONG: &str =
+    "only changes of these touches that take more than 2 hours do; `axiscal plan-next` looks for a shorter program";
+
 /// Does every variation that a program could make leave the first of a group and all others exactly as they are to each other?
 fn never_parted(group: &Group, tried: &[Tried]) -> bool {
     /// Share of an effect's own noncentrality: time constants of two effects are found one by one, and differ a little.
@@ -172,6 +176,7 @@ fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Separatin
         let says = match never {
             true if of_room => "measure again while the temperature of the room changes in another way",
             true => NEVER,
+            false if tried.iter().any(|t| told(t) > 0) => ONLY_LONG,
             false => LOOKED_FOR,
         };
         // a room that turns is something that touches wait for

@@ -304,7 +304,7 @@ impl Postprocessor {
         BUILT_IN.iter().position(|(file, _)| file.strip_suffix(".toml") == Some(name))
     }
 
-    /// Can a program be written for a built-in control of this name? Some only read what another program has measured.
+    /// Is a control of this name built in?
     #[must_use]
     pub fn is_built_in(name: &str) -> bool {
         Self::place_of(name).is_some()

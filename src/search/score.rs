@@ -201,15 +201,7 @@ pub(super) fn leader(scores: &[Score], library: &Library, generic: bool) -> Opti
 
 /// All score tests from inner products.
 pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError>) -> Vec<Score> {
-    let mut variants = 0;
-    let first: Vec<usize> = library
-        .candidates()
-        .iter()
-        .map(|candidate| {
-            variants += candidate.variants.len();
-            variants - candidate.variants.len()
-        })
-        .collect();
+    let first = first_variants(library);
     let mut scores: Vec<Score> =
         first.par_iter().enumerate().map(|(c, first)| score_of(moments, library, pure, (c, *first))).collect();
     multiplicity::adjust(&mut scores, |s| family(library, s.candidate));

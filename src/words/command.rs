@@ -16,7 +16,8 @@ pub(crate) fn quoted(word: &str) -> String {
     if !word.is_empty() && word.chars().all(plain) && !word.starts_with('~') {
         return word;
     }
-    if word.contains(['"', '$', '`', '\\', '!', '%']) {
+    // a backslash before another sign than these is one to every shell
+    if word.contains(['"', '$', '`', '!', '%']) || word.contains("\\\\") || word.ends_with('\\') {
         return format!("'{}'", word.replace('\'', "'\\''"));
     }
     format!("\"{word}\"")
@@ -49,7 +50,7 @@ pub(crate) fn run_in(path: &Path) -> String {
 
 /// The study.
 pub(crate) fn study(m: &Material) -> String {
-    quoted(&m.path.display().to_string())
+    quoted_path(m.path)
 }
 
 /// The control that wrote the logs.
@@ -100,6 +101,7 @@ mod tests {
             ("a;b", "\"a;b\""),
             ("-x.toml", "./-x.toml"),
             ("C:\\data\\study.toml", "C:\\data\\study.toml"),
+            ("C:\\my data\\study.toml", "\"C:\\my data\\study.toml\""),
             ("", "\"\""),
         ] {
             assert_eq!(quoted(word), expected);
@@ -118,9 +120,17 @@ mod tests {
     #[cfg(unix)]
     #[test]
     fn a_real_shell_reads_the_words_back() {
-        for word in
-            ["a b", "it's", "$HOME `id` \\ \"x\"", "a'\"$b", "!x %y", "*?[a]{b,c}", "a;b&c|d>e<f(g)#h\t~", "é µ"]
-        {
+        for word in [
+            "a b",
+            "it's",
+            "$HOME `id` \\ \"x\"",
+            "a'\"$b",
+            "!x %y",
+            "*?[a]{b,c}",
+            "a;b&c|d>e<f(g)#h\t~",
+            "é µ",
+            "C:\\my data\\new",
+        ] {
             let out = std::process::Command::new("sh").arg("-c").arg(format!("printf %s {}", quoted(word))).output();
             assert_eq!(String::from_utf8_lossy(&out.unwrap().stdout), word);
         }

@@ -264,36 +264,40 @@ pub fn check_size(o: &Oversized) -> String {
 
 fn answer(d: &Diagnosis, fit: &Fit) -> String {
     match &d.verdict {
-        Verdict::Adequate => adequate(d),
+        Verdict::Adequate => adequate(d, fit),
         Verdict::MissingEffect(missing) => missing_effect(d, missing),
         Verdict::Unexplained(unexplained) => not_explained(d, unexplained, fit),
         Verdict::TooLittleData(why) => too_little(d, why),
     }
 }
 
-fn adequate(d: &Diagnosis) -> String {
+fn adequate(d: &Diagnosis, fit: &Fit) -> String {
     let fits = format!("The model is complete as far as these touches can measure: {}.", against(d));
-    format!("{fits}{}{}", tested(d), without_temperature(d))
+    format!("{fits}{}{}", tested(d), without_temperature(d, fit))
 }
 
 /// A warm room looks like scatter of the index positions where few of them are measured: that the log lacks the temperature is
 /// said beside the verdict.
-fn without_temperature(d: &Diagnosis) -> String {
-    match &d.needs_temperature[..] {
-        [] => String::new(),
-        effects => format!(
-            " No touch has a temperature, so effects of the room temperature cannot be tested ({}). Keep the room at one \
-             temperature, or add temperatures to the touches (CSV, temperature_degC).",
-            effects.join(", ")
-        ),
+fn without_temperature(d: &Diagnosis, fit: &Fit) -> String {
+    if d.needs_temperature.is_empty() {
+        return String::new();
     }
+    let why = match fit.data.temperature_gap {
+        None => "The log has no temperatures",
+        Some(_) => "Temperatures are missing for a part of the touches",
+    };
+    format!(
+        " {why}, so effects of the room temperature cannot be tested ({}). Keep the room at one temperature, or add temperatures \
+         to the touches (CSV, temperature_degC).",
+        d.needs_temperature.join(", ")
+    )
 }
 
 fn tested(d: &Diagnosis) -> String {
     if d.power.is_empty() {
         return String::new();
     }
-    let unseen = match d.not_seen.len() {
+    let unseen = match d.not_seen.iter().filter(|id| !d.needs_temperature.contains(id)).count() {
         0 => String::new(),
         1 => "; 1 more has no effect on these touches".to_owned(),
         n => format!("; {n} more have no effect on these touches"),

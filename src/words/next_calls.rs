@@ -5,23 +5,13 @@ use super::command::quoted_path as quoted;
 use super::diagnose as words;
 use crate::diagnose::answer::Diagnosis;
 use crate::diagnose::next_step::NextStep;
-use crate::post::Postprocessor;
 use crate::program;
-use crate::workflow::{Disk, Loaded, controller_path};
+use crate::workflow::Loaded;
 use std::path::Path;
-
-/// The control that the study's runs were made on, as a call from here names it: the first of them that programs can be
-/// written for.
-#[must_use]
-pub(crate) fn controller(loaded: &Loaded) -> Option<String> {
-    let each = loaded.study.data.iter().map(|d| controller_path(&d.controller, loaded.folder(), &Disk::default()));
-    let mut each = each.filter(|c| c != "csv");
-    each.find(|c| Postprocessor::load_built_in_or_file(c).is_ok())
-}
 
 /// A call with the study's own control.
 fn with_control(loaded: &Loaded, call: impl Fn(&str) -> String) -> String {
-    match controller(loaded) {
+    match loaded.control() {
         Some(name) => call(&quoted(Path::new(&name))),
         // touches in a file of another origin: nobody knows the control
         None => call("NAME") + " (for NAME one of those that `axiscal controllers` lists)",

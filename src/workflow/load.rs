@@ -1,9 +1,9 @@
 //! From a study's path to machine, effects and touches: opens what the study names.
 
-use super::Environment;
 use super::active_compensation::{beside_the_axis, does_not_act, load_compensation};
 use super::history::history_path;
 use super::read_run::{LogFile, ReadPlan, controller_path, touches_of_run};
+use super::{Disk, Environment};
 use crate::design::{Planned, keep_measured};
 use crate::diag::{Failure, Finding, Findings, Result, Source, shown, source};
 use crate::fit::{self, Fit, Settings};
@@ -133,6 +133,14 @@ impl Loaded {
         let mut out = self.planned();
         keep_measured(&mut out, &fit.data);
         out
+    }
+
+    /// The control that the runs were made on, as a call from here names it: the first of them that programs can be written for.
+    #[must_use]
+    pub fn control(&self) -> Option<String> {
+        let each = self.study.data.iter().map(|d| controller_path(&d.controller, self.folder(), &Disk::default()));
+        let mut each = each.filter(|c| c != "csv");
+        each.find(|c| Postprocessor::load_built_in_or_file(c).is_ok())
     }
 
     #[must_use]

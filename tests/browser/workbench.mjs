@@ -146,7 +146,9 @@ async function noClickIsLost(t) {
     await page.reload();
     await page.waitForSelector("body[data-version]");
     await page.fill("#find", "squareness-");
-    const { x, y, width, height } = await page.locator("#candidates [data-switch=squareness-xy]").boundingBox();
+    const button = page.locator("#candidates [data-switch=squareness-xy]");
+    await button.waitFor({ state: "visible" });
+    const { x, y, width, height } = await button.boundingBox();
     await page.mouse.move(x + width / 2, y + height / 2);
     const answered = page.waitForResponse("**/api/evidence");
     const began = performance.now();

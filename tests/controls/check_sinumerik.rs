@@ -367,13 +367,16 @@ fn a_fault_of_a_called_program_is_shown_in_its_file() {
     let (machine, (post, _)) = (machine("trunnion"), Postprocessor::load_built_in_or_file("sinumerik").unwrap());
     let generated = generated(&machine, "basic", false);
     let nc = post.program(&machine, &generated.plan, &generated.path).unwrap();
-    let mut beside = nc.sources();
-    let (_, called) = beside.iter_mut().find(|(name, _)| name == "AXC_TOUCH.spf").unwrap();
-    let text = format!("{}FOO BAR\n", called.inner());
-    let line = text.lines().count();
-    *called = source("AXC_TOUCH.spf", text);
     let program = source("p.mpf", nc.text.as_str());
-    let failure = axiscal::check::grammar(&post, &program, &beside).unwrap_err();
-    let place = failure.0.first().and_then(axiscal::diag::Finding::place);
-    assert_eq!(place, Some(format!("AXC_TOUCH.spf:{line}:1")), "{failure}");
+    for at_the_end in [false, true] {
+        let mut beside = nc.sources();
+        let (_, called) = beside.iter_mut().find(|(name, _)| name == "AXC_TOUCH.spf").unwrap();
+        let text = called.inner();
+        let text = if at_the_end { format!("{text}FOO BAR\n") } else { format!("FOO BAR\n{text}") };
+        let line = if at_the_end { text.lines().count() } else { 1 };
+        *called = source("AXC_TOUCH.spf", text);
+        let failure = axiscal::check::grammar(&post, &program, &beside).unwrap_err();
+        let place = failure.0.first().and_then(axiscal::diag::Finding::place);
+        assert_eq!(place, Some(format!("AXC_TOUCH.spf:{line}:1")), "{failure}");
+    }
 }

@@ -32,7 +32,11 @@ touch = [{ ring = \"pole\" }, { ring = \"equator\" }]
 
 /// The study of a program on a probe with three lobes.
 fn lobed(at: &Path, azimuths: &str) {
-    std::fs::write(at.join("four.toml"), PROGRAM.replace("AZIMUTHS", azimuths)).unwrap();
+    lobed_on(at, &PROGRAM.replace("AZIMUTHS", azimuths));
+}
+
+fn lobed_on(at: &Path, program: &str) {
+    std::fs::write(at.join("four.toml"), program).unwrap();
     let wrong = "seed = 3\n[effects.location-a]\nEY0A = 0.02\n[effects.lobing-3]\nlobing3c = 3.0\n[noise]\ntouch_um = 0.5\nvisit_um = 0.3\n";
     std::fs::write(at.join("wrong.toml"), wrong).unwrap();
     let machine = ["--machine", "trunnion", "--controller", "linuxcnc"];
@@ -80,4 +84,50 @@ fn radius_and_tip_are_one_number() {
     let (both, _) = json(at, &["identify", "study.toml"]);
     let says = both["undetermined"].to_string();
     assert!(says.contains("pretravel") && says.contains("diameter"), "{says}");
+}
+
+/// Most points of a sphere are touched once: one touch has nothing in common with itself.
+#[test]
+fn points_that_are_touched_once_are_no_split() {
+    let folder = tempfile::tempdir().unwrap();
+    lobed_on(folder.path(), &PROGRAM.replace("AZIMUTHS", "0, 90, 180, 270").replace("repeats = 2", "repeats = 1"));
+    let (said, _) = json(folder.path(), &["compare", "study.toml"]);
+    let by: Vec<&str> = said["splits"].as_array().unwrap().iter().map(|s| s["by"].as_str().unwrap()).collect();
+    assert!(!by.contains(&"face") && by.contains(&"pose.C") && by.contains(&"direction"), "{by:?}");
+}
+
+/// docs/guide/diagnose.md: a log has no temperatures, and they are added.
+#[test]
+fn temperatures_can_be_added_to_a_log() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    lobed(at, "0, 90, 180, 270");
+    let needs = |study: &str| json(at, &["diagnose", study]).0["needs_temperature"].as_array().map_or(0, Vec::len);
+    assert!(needs("study.toml") > 0);
+    ok(
+        at,
+        &[
+            "parse",
+            "four.log",
+            "--controller",
+            "linuxcnc",
+            "--plan",
+            "four.plan.json",
+            "--machines",
+            "machines.toml",
+            "--out",
+            "touches.csv",
+        ],
+    );
+    let csv = std::fs::read_to_string(at.join("touches.csv")).unwrap();
+    assert!(!csv.contains("time_s"), "{csv}");
+    let with = csv.lines().enumerate().map(|(i, line)| match i {
+        0 => format!("{line},temperature_degC\n"),
+        i => format!("{line},{}\n", 20.0 + 0.01 * i as f64),
+    });
+    std::fs::write(at.join("touches.csv"), with.collect::<String>()).unwrap();
+    let study = std::fs::read_to_string(at.join("study.toml")).unwrap();
+    let study = study.replace("four.log", "touches.csv").replace("controller = \"linuxcnc\"", "controller = \"csv\"");
+    std::fs::write(at.join("warm.toml"), study).unwrap();
+    assert_eq!(needs("warm.toml"), 0);
 }

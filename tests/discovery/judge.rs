@@ -4,7 +4,7 @@ use super::bench::{Act, Bench};
 use super::faults::{self, Fault};
 use super::mistakes::Mistake;
 use axiscal::diagnose::evidence::Evidence;
-use axiscal::diagnose::{Diagnosis, Options, Subject, diagnose};
+use axiscal::diagnose::{Diagnosis, Options, Subject, Verdict, diagnose};
 use axiscal::fit::{Fit, Settings, identify_data};
 use axiscal::log::Touch;
 use axiscal::model::catalogue::Catalogue;
@@ -257,6 +257,8 @@ pub struct Led {
     pub what: &'static str,
     /// After one or two steps the answer names one of the expected effects or mistakes.
     pub led: bool,
+    /// Nothing is named, and the verdict says that one of the expected effects cannot be tested without temperatures.
+    pub not_testable: bool,
     pub said: Vec<String>,
 }
 
@@ -269,10 +271,10 @@ pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
         Err(refused) => {
             let said: Vec<String> = refused.0.into_iter().map(|finding| finding.message).collect();
             let led = said.iter().any(|message| mistake.expects.iter().any(|word| message.contains(word)));
-            return Led { bench: bench.name.clone(), what: mistake.what, led, said };
+            return Led { bench: bench.name.clone(), what: mistake.what, led, not_testable: false, said };
         }
     };
-    let (mut more, mut said, mut led) = (Vec::new(), Vec::new(), false);
+    let (mut more, mut said, mut led, mut not_testable) = (Vec::new(), Vec::new(), false, false);
     for _ in 0..2 {
         let (fit, settings) = fit(bench, &touches, &more);
         let d = ask(bench, &fit, &settings);
@@ -281,6 +283,7 @@ pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
         let named = first.is_some_and(|g| g.iter().any(|id| mistake.expects.contains(&id.as_str())));
         let gross = d.mistake().is_some_and(|says| mistake.expects.iter().any(|id| says.contains(id)));
         // a finding about a size that no machine has: it names the effect or its parameters
+        let cannot_be_tested = |id: &str| d.verdict == Verdict::Adequate && d.needs_temperature.iter().any(|e| e == id);
         let told = |id: &str| {
             let of = fit.model.unknowns.iter().filter(|u| u.effect == id).map(|u| u.own_name().to_owned());
             let names: Vec<String> = of.chain([id.to_owned()]).collect();
@@ -290,7 +293,8 @@ pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
                 .chain([&d.says])
                 .any(|w| names.iter().any(|n| w.contains(n.as_str())))
         };
-        led |= named || gross || mistake.expects.iter().any(|id| told(id));
+        led |= named || gross || mistake.expects.iter().any(|id| !cannot_be_tested(id) && told(id));
+        not_testable |= mistake.expects.iter().any(|id| cannot_be_tested(id) && d.says.contains(id));
         let first_name = first.map(|g| g[0].clone());
         said.push(format!("{}: {}", d.verdict.as_str(), first_name.as_deref().unwrap_or("no effect")));
         match first_name.filter(|id| id != "sign-or-axis-swap") {
@@ -298,7 +302,7 @@ pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
             None => break,
         }
     }
-    Led { bench: bench.name.clone(), what: mistake.what, led, said }
+    Led { bench: bench.name.clone(), what: mistake.what, led, not_testable: not_testable && !led, said }
 }
 
 /// Wilson's interval of a rate, 95 %.
