@@ -143,7 +143,7 @@ const LOOKED_FOR: &str = "no single change of these touches does; `axiscal plan-
 
 /// What is said where only variations of more than [`LONGEST_S`] help.
 const ONLY_LONG: &str =
-    "only changes of these touches that take more than 2 hours do; `axiscal plan-next` looks for a shorter program";
+    "changes of these touches separate them only in more than 2 hours; `axiscal plan-next` looks for a shorter program";
 
 /// Does every variation that a program could make leave the first of a group and all others exactly as they are to each other?
 fn never_parted(group: &Group, tried: &[Tried]) -> bool {

@@ -114,6 +114,9 @@ pub(super) fn decimal_mark<'a>(lines: impl Iterator<Item = &'a [u8]>) -> u8 {
     if comma && !point { b',' } else { b'.' }
 }
 
+/// Nothing is colder, °C.
+const ABSOLUTE_ZERO_DEG_C: f64 = -273.15;
+
 type At = (std::ops::Range<usize>, String);
 
 fn touch(line: &[u8], line_number: usize, columns: &[Column], separator: u8, mark: u8) -> Result<RawTouch, At> {
@@ -162,6 +165,7 @@ fn touch(line: &[u8], line_number: usize, columns: &[Column], separator: u8, mar
                 out.present[axis.index()] = true;
             }
             Column::Time => out.time_s = Some(value.value),
+            Column::Temperature if value.value < ABSOLUTE_ZERO_DEG_C => return Err(wrong("a temperature in °C")),
             Column::Temperature => out.temperature_deg_c = Some(value.value),
             Column::Status => {}
         }

@@ -276,6 +276,9 @@ fn a_csv_may_come_from_a_spreadsheet() {
     let places: Vec<_> = findings.0.iter().map(|f| f.place().unwrap()).collect();
     assert_eq!(places, ["t:2:1", "t:4:7", "t:5:7"]);
     assert!(findings.0[0].message.contains("decimal commas"));
+    let cold = b"id,X,Y,Z,temperature_degC\n1,1,2,3,-400\n2,1,2,3,20\n";
+    let (touches, findings) = csv::read(cold, "t").unwrap();
+    assert_eq!((touches.len(), findings.0[0].place().as_deref()), (1, Some("t:2:9")));
     for bad in ["id,X,Y\n1,2,3\n", "id,X,Y,Z,Q\n1,2,3,4,5\n", "id,X,Y,Z,X\n1,2,3,4,5\n", "id,X,Y,Z\n", " \n"] {
         assert!(csv::read(bad.as_bytes(), "t").is_err(), "{bad}");
     }
