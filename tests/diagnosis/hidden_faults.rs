@@ -114,7 +114,7 @@ fn hidden_faults_are_in_the_first_groups() {
 /// All eight kinds on the paper's plan of each machine; on `full` the example counts them. Where ten index positions cannot tell a
 /// warm room from scatter, the verdict says that effects of the room cannot be tested.
 #[test]
-fn every_set_up_mistake_is_led_to_its_cause() {
+fn every_set_up_mistake_is_led_to_its_cause_or_said_to_be_untestable() {
     let mut not_testable = Vec::new();
     let cases = Bench::all(false).into_iter().flat_map(|bench| MISTAKES.iter().map(move |m| (bench.clone(), m)));
     for (bench, mistake) in cases {
