@@ -198,10 +198,10 @@ fn of_the_generator(part: &str, count: &dyn Fn(usize) -> usize) {
                     let led = judge::mistake(&bench, mistake, 56);
                     println!(
                         "{} | {} | {} | {}",
-                        match (led.led, led.not_testable) {
-                            (true, _) => "led          ",
-                            (false, true) => "said not testable",
-                            (false, false) => "NOT LED",
+                        match (led.led, led.gave_temperatures) {
+                            (true, false) => "led",
+                            (true, true) => "led with the temperatures that it asked for",
+                            (false, _) => "NOT LED",
                         },
                         led.bench,
                         led.what,

@@ -266,7 +266,9 @@ fn answer(d: &Diagnosis, fit: &Fit) -> String {
     match &d.verdict {
         Verdict::Adequate => adequate(d, fit),
         Verdict::MissingEffect(missing) => missing_effect(d, missing),
-        Verdict::Unexplained(unexplained) => not_explained(d, unexplained, fit),
+        Verdict::Unexplained(unexplained) => {
+            format!("{}{}", not_explained(d, unexplained, fit), without_temperature(d, fit))
+        }
         Verdict::TooLittleData(why) => too_little(d, why),
     }
 }
@@ -276,8 +278,8 @@ fn adequate(d: &Diagnosis, fit: &Fit) -> String {
     format!("{fits}{}{}", tested(d), without_temperature(d, fit))
 }
 
-/// A warm room looks like scatter of the index positions where few of them are measured: that the log lacks the temperature is
-/// said beside the verdict.
+/// A warm room looks like scatter of the index positions where few of them are measured, and like a drift that no effect explains
+/// where many are: that the log lacks the temperature is said beside the verdict.
 fn without_temperature(d: &Diagnosis, fit: &Fit) -> String {
     if d.needs_temperature.is_empty() {
         return String::new();

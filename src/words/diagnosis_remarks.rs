@@ -27,8 +27,8 @@ pub(crate) fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
         });
     }
     out.extend(not_used(d));
-    // an adequate model says it beside the verdict
-    if !d.needs_temperature.is_empty() && d.verdict != Verdict::Adequate {
+    // where no effect is named, the verdict says it
+    if !d.needs_temperature.is_empty() && !matches!(d.verdict, Verdict::Adequate | Verdict::Unexplained(_)) {
         out.push(format!("cannot be measured without temperatures in the log: {}", d.needs_temperature.join(", ")));
     }
     let unseen: Vec<&str> =

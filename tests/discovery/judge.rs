@@ -4,7 +4,7 @@ use super::bench::{Act, Bench};
 use super::faults::{self, Fault};
 use super::mistakes::Mistake;
 use axiscal::diagnose::evidence::Evidence;
-use axiscal::diagnose::{Diagnosis, Options, Subject, Verdict, diagnose};
+use axiscal::diagnose::{Diagnosis, Options, Subject, diagnose};
 use axiscal::fit::{Fit, Settings, identify_data};
 use axiscal::log::Touch;
 use axiscal::model::catalogue::Catalogue;
@@ -257,33 +257,38 @@ pub struct Led {
     pub what: &'static str,
     /// After one or two steps the answer names one of the expected effects or mistakes.
     pub led: bool,
-    /// Nothing is named, and the verdict says that one of the expected effects cannot be tested without temperatures.
-    pub not_testable: bool,
+    /// The first step named nothing that could be added; the verdict said that an expected effect cannot be tested without
+    /// temperatures, and the user gave them.
+    pub gave_temperatures: bool,
     pub said: Vec<String>,
 }
 
-/// Is a user who made a mistake led to its cause within two steps?
+/// Is a user who made a mistake led to its cause within two steps? A step adds the effect that is named first, or gives the
+/// temperatures that the verdict asks for.
 pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let base = bench.ordinary(&mut rng);
-    let touches = match (mistake.make)(bench, &base, &mut rng) {
+    let mut same_draws = rng.clone();
+    let mut result =
+        Led { bench: bench.name.clone(), what: mistake.what, led: false, gave_temperatures: false, said: Vec::new() };
+    let mut touches = match (mistake.make)(bench, &base, &mut rng) {
         Ok(touches) => touches,
         Err(refused) => {
-            let said: Vec<String> = refused.0.into_iter().map(|finding| finding.message).collect();
-            let led = said.iter().any(|message| mistake.expects.iter().any(|word| message.contains(word)));
-            return Led { bench: bench.name.clone(), what: mistake.what, led, not_testable: false, said };
+            result.said = refused.0.into_iter().map(|finding| finding.message).collect();
+            result.led = result.said.iter().any(|message| mistake.expects.iter().any(|word| message.contains(word)));
+            return result;
         }
     };
-    let (mut more, mut said, mut led, mut not_testable) = (Vec::new(), Vec::new(), false, false);
+    let (mut more, mut expects) = (Vec::new(), mistake.expects);
     for _ in 0..2 {
         let (fit, settings) = fit(bench, &touches, &more);
         let d = ask(bench, &fit, &settings);
         let groups = groups(&d);
         let first = groups.first().filter(|_| d.verdict.is_missing_effect());
-        let named = first.is_some_and(|g| g.iter().any(|id| mistake.expects.contains(&id.as_str())));
-        let gross = d.mistake().is_some_and(|says| mistake.expects.iter().any(|id| says.contains(id)));
+        let named = first.is_some_and(|g| g.iter().any(|id| expects.contains(&id.as_str())));
+        let gross = d.mistake().is_some_and(|says| expects.iter().any(|id| says.contains(id)));
         // a finding about a size that no machine has: it names the effect or its parameters
-        let cannot_be_tested = |id: &str| d.verdict == Verdict::Adequate && d.needs_temperature.iter().any(|e| e == id);
+        let cannot_be_tested = |id: &str| d.needs_temperature.iter().any(|e| e == id);
         let told = |id: &str| {
             let of = fit.model.unknowns.iter().filter(|u| u.effect == id).map(|u| u.own_name().to_owned());
             let names: Vec<String> = of.chain([id.to_owned()]).collect();
@@ -293,16 +298,20 @@ pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
                 .chain([&d.says])
                 .any(|w| names.iter().any(|n| w.contains(n.as_str())))
         };
-        led |= named || gross || mistake.expects.iter().any(|id| !cannot_be_tested(id) && told(id));
-        not_testable |= mistake.expects.iter().any(|id| cannot_be_tested(id) && d.says.contains(id));
+        result.led |= named || gross || expects.iter().any(|id| !cannot_be_tested(id) && told(id));
+        let asks_for_temperatures = expects.iter().any(|id| cannot_be_tested(id) && d.says.contains(id));
         let first_name = first.map(|g| g[0].clone());
-        said.push(format!("{}: {}", d.verdict.as_str(), first_name.as_deref().unwrap_or("no effect")));
-        match first_name.filter(|id| id != "sign-or-axis-swap") {
-            Some(id) => more.push(id),
-            None => break,
+        result.said.push(format!("{}: {}", d.verdict.as_str(), first_name.as_deref().unwrap_or("no effect")));
+        match (first_name.filter(|id| id != "sign-or-axis-swap"), &mistake.with_temperatures) {
+            (Some(id), _) => more.push(id),
+            (None, Some((make, then))) if asks_for_temperatures => {
+                touches = make(bench, &base, &mut same_draws).unwrap();
+                (result.gave_temperatures, expects) = (true, then);
+            }
+            _ => break,
         }
     }
-    Led { bench: bench.name.clone(), what: mistake.what, led, not_testable: not_testable && !led, said }
+    result
 }
 
 /// Wilson's interval of a rate, 95 %.

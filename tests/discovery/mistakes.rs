@@ -19,36 +19,42 @@ pub struct Mistake {
     pub expects: &'static [&'static str],
     /// The logs that the program reads, or why it refuses them.
     pub make: fn(&Bench, &Act, &mut ChaCha8Rng) -> Logs,
+    /// The same touches after the user has given the temperatures that the verdict asked for, and the ids that may be named then.
+    pub with_temperatures: Option<(fn(&Bench, &Act, &mut ChaCha8Rng) -> Logs, &'static [&'static str])>,
 }
 
 /// Scatter of a touch and of an index position, µm.
 const TOUCH_UM: f64 = 1.0;
 
 pub const MISTAKES: [Mistake; 8] = [
-    Mistake { what: "ball radius typed 0.05 mm wrong", expects: &["pretravel"], make: ball_radius },
+    Mistake { what: "ball radius typed 0.05 mm wrong", expects: &["pretravel"], make: ball_radius, with_temperatures: None },
     Mistake {
         what: "pivot or axis 0.5 mm wrong in the machine file",
         expects: &["location-a", "location-b", "location-c", "tool-length"],
         make: pivot,
+        with_temperatures: None,
     },
     Mistake {
         what: "tool length 0.3 mm wrong",
         expects: &["tool-length", "location-a", "location-b", "location-c", "block-setup"],
         make: tool_length,
+        with_temperatures: None,
     },
     Mistake {
         what: "blocks 0.05 mm larger than in the plan",
         expects: &["block-size", "block-own-size", "pretravel"],
         make: oversize,
+        with_temperatures: None,
     },
-    Mistake { what: "one block turned by 2 degrees", expects: &["block-setup"], make: turned_block },
-    Mistake { what: "a probe with a ball of 5 mm instead of 6 mm", expects: &["pretravel"], make: wrong_probe },
+    Mistake { what: "one block turned by 2 degrees", expects: &["block-setup"], make: turned_block, with_temperatures: None },
+    Mistake { what: "a probe with a ball of 5 mm instead of 6 mm", expects: &["pretravel"], make: wrong_probe, with_temperatures: None },
     Mistake {
         what: "temperature not logged while the frame bends with it",
         expects: &["ambient-bending", "drift-linear", "warm-up"],
-        make: no_temperature,
+        make: |bench, base, rng| bending(bench, base, false, rng),
+        with_temperatures: Some((|bench, base, rng| bending(bench, base, true, rng), &["ambient-bending"])),
     },
-    Mistake { what: "log in inches", expects: &["inch", "sign-or-axis-swap"], make: inches },
+    Mistake { what: "log in inches", expects: &["inch", "sign-or-axis-swap"], make: inches, with_temperatures: None },
 ];
 
 fn with(
@@ -99,9 +105,9 @@ fn wrong_probe(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Logs {
     with(bench, base, |_, wrong| wrong.late += 0.5, rng)
 }
 
-fn no_temperature(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Logs {
+fn bending(bench: &Bench, base: &Act, logged: bool, rng: &mut ChaCha8Rng) -> Logs {
     let bends = |at: &At, wrong: &mut Wrong| wrong.tool += V::new(0.6, -0.4, 0.7) * (5e-3 * at.kelvin);
-    matched(bench, bench.raw(&[base, &bends], TOUCH_UM, 0.0, false, rng))
+    matched(bench, bench.raw(&[base, &bends], TOUCH_UM, 0.0, logged, rng))
 }
 
 fn inches(bench: &Bench, base: &Act, rng: &mut ChaCha8Rng) -> Logs {
