@@ -77,18 +77,18 @@ pub fn assess(request: &Request) -> Result<Assessment> {
             );
         }
     }
-    let seen = power(&view.base, &view.library, &|c| view.raw_um[c].clone());
-    let pairs = alias_pairs(&view.base, &view.library);
-    let nullity = view.jacobian.ncols() - view.base.rank();
+    let seen = power(view.base(), &view.library, &|c| view.raw_um[c].clone());
+    let pairs = alias_pairs(view.base(), &view.library);
+    let nullity = view.jacobian.ncols() - view.base().rank();
     let results = Results::new(&alone.model, &alone.free);
     let tried: Vec<Tried> = variations(task.machine, &request.runs, &view.model)
         .into_iter()
         .map(|variation| {
             let varied = LinearisedPlan::new(task, &variation.runs(&request.runs), &variation.known, acting)?;
-            let power = power(&varied.base, &varied.library, &|c| varied.raw_um[c].clone());
-            let pairs = alias_pairs(&varied.base, &varied.library);
+            let power = power(varied.base(), &varied.library, &|c| varied.raw_um[c].clone());
+            let pairs = alias_pairs(varied.base(), &varied.library);
             // further blocks bring further unknowns: only what was unknown before counts
-            let nullity = (varied.jacobian.ncols() - varied.base.rank()).min(nullity);
+            let nullity = (varied.jacobian.ncols() - varied.base().rank()).min(nullity);
             let remedy = (!observability.unseen.is_empty()).then(|| Remedy::new(&variation, &varied, &results));
             Ok(Tried { variation, power, pairs, nullity, remedy })
         })

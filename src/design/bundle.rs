@@ -1,7 +1,7 @@
 //! Bundles of touches that a further program may be made of: one block in one pose, and the program file of a choice.
 
 use super::linearised_plan::{INDEX_S, STYLUS_S, TOUCH_S};
-use super::vary::faces_the_spindle;
+use super::vary::{faces_the_spindle, way_to_face};
 use crate::axes::{AxisMap, AxisName, Position};
 use crate::machine::{Block, Form, Machine, Mounting};
 use crate::program::as_written::RingIn;
@@ -249,18 +249,8 @@ fn touch(
     at: &Position,
 ) -> Option<PlanTouch> {
     let (probe, length_mm) = (&machine.probe, machine.tool.length_mm);
-    let place = |off_face: f64| -> Option<AxisMap> {
-        let ball = point + normal * (probe.ball_radius + off_face);
-        let at = machine.linear_for_ball(block.carrier, at, &ball, length_mm)?;
-        let inside = |name: AxisName| {
-            machine.axis(name).is_none_or(|axis| {
-                let [low, high] = axis.program_range();
-                (low..=high).contains(&at.get(name))
-            })
-        };
-        let xyz = at.xyz_mm();
-        [AxisName::X, AxisName::Y, AxisName::Z].into_iter().all(inside).then(|| AxisMap::xyz(xyz.x, xyz.y, xyz.z))
-    };
+    let [start, nominal, end] =
+        way_to_face(machine, block.carrier, at, (*point, *normal), probe.ball_radius, length_mm)?;
     Some(PlanTouch {
         id: 0,
         stage: "next".into(),
@@ -272,9 +262,9 @@ fn touch(
         point: (*point).into(),
         normal: (*normal).into(),
         pose: manner.pose,
-        start: place(probe.approach)?,
-        nominal: place(0.0)?,
-        end: place(-probe.search)?,
+        start,
+        nominal,
+        end,
         time_s: None,
         visit: None,
         feed_mm_min: Some(manner.feed_mm_min),

@@ -19,6 +19,7 @@ use crate::search::{Basis, KEPT, Library, Origin, without_rounding};
 use crate::units::um_from_mm;
 use nalgebra::{DMatrix, Vector3};
 use std::collections::{BTreeMap, HashSet};
+use std::sync::OnceLock;
 
 /// A touch with its way there, s, where a plan does not predict its times.
 pub const TOUCH_S: f64 = 12.0;
@@ -204,8 +205,8 @@ pub struct LinearisedPlan {
     pub free: Vec<usize>,
     /// Whitened Jacobian of the free unknowns: touches, then what is known beside them.
     pub jacobian: DMatrix<f64>,
-    /// What the model can follow.
-    pub base: Basis,
+    /// What the model can follow, when it is asked for.
+    base: OnceLock<Basis>,
     /// The effects that it leaves out: whitened columns in units of typical sizes, one variant each.
     pub library: Library,
     /// Their columns before whitening, µm at typical size, effect by effect.
@@ -291,10 +292,16 @@ impl LinearisedPlan {
                 }
             }
         }
-        let base = Basis::new(&jacobian);
+        let base = OnceLock::new();
         let library = Library::new(jacobian.nrows());
         let (raw_um, shapes, left_out) = (Vec::new(), Vec::new(), Vec::new());
         Ok(Self { data, model, theta, free, jacobian, base, library, raw_um, shapes, left_out, noise, end_s })
+    }
+
+    /// What the model can follow.
+    #[must_use]
+    pub fn base(&self) -> &Basis {
+        self.base.get_or_init(|| Basis::new(&self.jacobian))
     }
 
     /// Puts effects into the library, each at the given shape; else at its usual one, or where that leaves no trace at the
@@ -396,7 +403,7 @@ impl LinearisedPlan {
     /// Share of a block's norm that the model cannot follow.
     fn kept(&self, columns: &DMatrix<f64>) -> f64 {
         let norm = columns.norm();
-        if norm > 0.0 { self.base.project_columns(columns).norm() / norm } else { 0.0 }
+        if norm > 0.0 { self.base().project_columns(columns).norm() / norm } else { 0.0 }
     }
 
     /// Rows that are touches.

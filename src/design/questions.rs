@@ -94,9 +94,9 @@ impl Questions {
     /// The pairs that a plan confounds both ways, those first that would be seen best at typical size.
     #[must_use]
     pub fn of_plan(view: &LinearisedPlan) -> Self {
-        let seen = power(&view.base, &view.library, &|c| view.raw_um[c].clone());
+        let seen = power(view.base(), &view.library, &|c| view.raw_um[c].clone());
         let id = |c: usize| view.library.candidates()[c].id.clone();
-        let mut pairs: Vec<(f64, Pair)> = alias_pairs(&view.base, &view.library)
+        let mut pairs: Vec<(f64, Pair)> = alias_pairs(view.base(), &view.library)
             .into_iter()
             .filter(|p| p.both_ways && p.explained < p.by)
             .map(|p| {

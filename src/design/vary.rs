@@ -103,24 +103,13 @@ pub fn again(machine: &Machine, plan: &Plan, touch: &PlanTouch, change: &Change)
             return None;
         }
     }
-    let (point, normal) = (Vector3::from(touch.point), Vector3::from(touch.normal));
-    let place = |off_face: f64| -> Option<AxisMap> {
-        let ball = point + normal * (radius_mm + off_face);
-        let at = machine.linear_for_ball(carrier, &at, &ball, length_mm)?;
-        let inside = |name: AxisName| {
-            machine.axis(name).is_none_or(|axis| {
-                let [low, high] = axis.program_range();
-                (low..=high).contains(&at.get(name))
-            })
-        };
-        let xyz = at.xyz_mm();
-        [AxisName::X, AxisName::Y, AxisName::Z].into_iter().all(inside).then(|| AxisMap::xyz(xyz.x, xyz.y, xyz.z))
-    };
+    let face = (touch.point.into(), touch.normal.into());
+    let [start, nominal, end] = way_to_face(machine, carrier, &at, face, radius_mm, length_mm)?;
     Some(PlanTouch {
         pose,
-        start: place(machine.probe.approach)?,
-        nominal: place(0.0)?,
-        end: place(-machine.probe.search)?,
+        start,
+        nominal,
+        end,
         repeat: 1,
         from: change.from.or(&touch.from),
         spindle_deg: change.spindle_deg.or(touch.spindle_deg),
@@ -129,6 +118,31 @@ pub fn again(machine: &Machine, plan: &Plan, touch: &PlanTouch, change: &Change)
         first: false,
         ..touch.clone()
     })
+}
+
+/// Linear axes at the start, the contact and the end of a touch of a face (a point and its outward normal, in the carrier's frame, mm);
+/// `None` where one of them does not go there.
+#[must_use]
+pub fn way_to_face(
+    machine: &Machine,
+    carrier: Carrier,
+    pose: &Position,
+    (point, normal): (Vector3<f64>, Vector3<f64>),
+    ball_radius_mm: f64,
+    length_mm: f64,
+) -> Option<[AxisMap; 3]> {
+    let places = machine.ball_places(carrier, pose, length_mm)?;
+    let at = [machine.probe.approach, 0.0, -machine.probe.search]
+        .map(|off_face_mm| places.linear_for(&(point + normal * (ball_radius_mm + off_face_mm))));
+    let inside = |xyz: &Vector3<f64>| {
+        [AxisName::X, AxisName::Y, AxisName::Z].into_iter().zip(xyz.iter()).all(|(name, mm)| {
+            machine.axis(name).is_none_or(|axis| {
+                let [low, high] = axis.program_range();
+                (low..=high).contains(mm)
+            })
+        })
+    };
+    at.iter().all(inside).then(|| at.map(|xyz| AxisMap::xyz(xyz.x, xyz.y, xyz.z)))
 }
 
 /// Can a straight stylus meet a face that looks along `normal` (carrier's frame)?

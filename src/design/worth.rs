@@ -29,7 +29,7 @@ impl Worth {
             if determined && share.is_finite() { share } else { f64::INFINITY }
         });
         let worst = in_usual_sizes.fold(0.0, f64::max);
-        let powers = power(&view.base, &view.library, &|c| view.raw_um[c].clone());
+        let powers = power(view.base(), &view.library, &|c| view.raw_um[c].clone());
         Self { worst, found: powers.iter().filter(|p| p.at_typical >= SEEN).count() }
     }
 

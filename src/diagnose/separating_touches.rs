@@ -123,7 +123,7 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
                 .zip(spans)
                 .map(|(&c, span)| (c, span, seen.order.scores[c].estimate.clone()))
                 .collect();
-            let products = Products::new(&view.base, &view.library.matrix());
+            let products = Products::new(view.base(), &view.library.matrix());
             Ok(Tried {
                 program: variation.is_a_program(machine),
                 says: variation.says,

@@ -147,7 +147,7 @@ pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[Spindle
         let mut last_sense = [0.0; 6];
         let mut before = Before::default();
         let mut way = WaySinceReversal::default();
-        let mut turned = LastTurned::default();
+        let (mut turned, mut ideal_turned, mut places) = (Last::default(), Last::default(), Last::default());
         visits.last = None;
         let logged = run.touches.iter().filter(|t| t.position.0.iter().all(|v| v.is_finite()));
         let of_log = run.touches.iter().find_map(|t| t.digit_mm);
@@ -215,11 +215,12 @@ pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[Spindle
             let length_mm = planned.tool_length_mm.unwrap_or(run.plan.tool_length_mm);
             let ball_radius = planned.ball_radius_mm.unwrap_or(run.plan.ball_radius_mm);
             let ball = point + normal * ball_radius;
-            let ideal =
-                machine.linear_for_ball(carrier, &planned.pose.position(), &ball, length_mm).unwrap_or(touch.position);
+            let pose = planned.pose.position();
+            let places = places
+                .of((carrier, angles(&pose), length_mm.to_bits()), || machine.ball_places(carrier, &pose, length_mm));
+            let ideal = places.map_or(touch.position, |places| pose.with_xyz_mm(places.linear_for(&ball)));
             // the rotary axes stand where the control says they stand; a log without them means the plan's pose
-            let turned = &mut turned;
-            let mut at = |position: Position| Observation {
+            let at = |position: Position, turned: &mut Last<_, _>| Observation {
                 run: index,
                 id: touch.id,
                 set_up,
@@ -231,7 +232,10 @@ pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[Spindle
                 position,
                 has_temperature: temperature_deg_c.is_some(),
                 state: Circumstances {
-                    turned: turned.of(machine, carrier, &position),
+                    turned: turned.of((carrier, angles(&position)), || Turned {
+                        tool: machine.tool_frame(&position).rotation,
+                        carrier: machine.carrier_frame(carrier, &position).rotation,
+                    }),
                     machine,
                     carrier,
                     block,
@@ -246,7 +250,7 @@ pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[Spindle
                 }
                 .state(),
             };
-            let observation = at(touch.position);
+            let observation = at(touch.position, &mut turned);
             data.origins.push(Origin {
                 line: touch.line,
                 stage: planned.stage.to_string(),
@@ -254,7 +258,7 @@ pub fn assemble_with_spindle(machine: &Machine, runs: &[Run], spindle: &[Spindle
                 face: planned.face.to_string(),
             });
             // what formulas see is nominal too: noise in a coordinate would make a null direction look seen
-            data.nominal.push(at(ideal));
+            data.nominal.push(at(ideal, &mut ideal_turned));
             data.repeats.push(repeat_group(&data, &numbered, planned, index));
             let visit = visits.number_of(&mut data, index, planned, mounting_key(&label, mounting));
             data.visits.push(visit);
@@ -411,25 +415,32 @@ struct Turned {
     carrier: UnitQuaternion<f64>,
 }
 
-/// The same of the last pose: touches of a pose follow one another.
-#[derive(Debug, Default)]
-struct LastTurned(Option<(Carrier, [u64; 3], Turned)>);
+/// What was made of the last pose: touches of a pose follow one another.
+#[derive(Debug)]
+struct Last<K, V>(Option<(K, V)>);
 
-impl LastTurned {
-    fn of(&mut self, machine: &Machine, carrier: Carrier, at: &Position) -> Turned {
-        let pose = [3, 4, 5].map(|i| at.0[i].to_bits());
+impl<K, V> Default for Last<K, V> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+impl<K: PartialEq, V: Copy> Last<K, V> {
+    fn of(&mut self, key: K, make: impl FnOnce() -> V) -> V {
         match &self.0 {
-            Some((of, known, turned)) if *of == carrier && *known == pose => *turned,
+            Some((known, value)) if *known == key => *value,
             _ => {
-                let turned = Turned {
-                    tool: machine.tool_frame(at).rotation,
-                    carrier: machine.carrier_frame(carrier, at).rotation,
-                };
-                self.0 = Some((carrier, pose, turned));
-                turned
+                let value = make();
+                self.0 = Some((key, value));
+                value
             }
         }
     }
+}
+
+/// The rotary axes' angles, to the bit.
+fn angles(at: &Position) -> [u64; 3] {
+    [3, 4, 5].map(|i| at.0[i].to_bits())
 }
 
 /// What the state of a touch is made of.

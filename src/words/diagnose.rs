@@ -93,8 +93,12 @@ pub fn is_plain(variable: &str) -> bool {
 
 /// The form of a shape, from its id: `order`, `step`, …, or nothing for the smooth ones.
 fn form(d: &Dependence) -> &str {
-    let middle = d.id.split(':').nth(1).unwrap_or_default();
-    middle.strip_prefix(&d.on).map_or(middle, |rest| rest.trim_start_matches('-'))
+    form_of(&d.id, &d.on)
+}
+
+fn form_of<'a>(id: &'a str, on: &str) -> &'a str {
+    let middle = id.split(':').nth(1).unwrap_or_default();
+    middle.strip_prefix(on).map_or(middle, |rest| rest.trim_start_matches('-'))
 }
 
 fn turns(order: f64) -> String {
@@ -267,7 +271,8 @@ fn answer(d: &Diagnosis, fit: &Fit) -> String {
         Verdict::Adequate => adequate(d, fit),
         Verdict::MissingEffect(missing) => missing_effect(d, missing),
         Verdict::Unexplained(unexplained) => {
-            format!("{}{}", not_explained(d, unexplained, fit), without_temperature(d, fit))
+            let room = if may_be_the_room(d) { without_temperature(d, fit) } else { String::new() };
+            format!("{}{room}", not_explained(d, unexplained, fit))
         }
         Verdict::TooLittleData(why) => too_little(d, why),
     }
@@ -276,6 +281,11 @@ fn answer(d: &Diagnosis, fit: &Fit) -> String {
 fn adequate(d: &Diagnosis, fit: &Fit) -> String {
     let fits = format!("The model is complete as far as these touches can measure: {}.", against(d));
     format!("{fits}{}{}", tested(d), without_temperature(d, fit))
+}
+
+/// Does a residual that no effect explains change with time as a room's temperature does, and not in a jump?
+pub(crate) fn may_be_the_room(d: &Diagnosis) -> bool {
+    d.depends.first().is_some_and(|first| first.on == "t" && form_of(&first.id, &first.on) != "step")
 }
 
 /// A warm room looks like scatter of the index positions where few of them are measured, and like a drift that no effect explains

@@ -1,6 +1,6 @@
 //! What a reader must know beside the verdict of a diagnosis.
 
-use super::diagnose::plain;
+use super::diagnose::{may_be_the_room, plain};
 use crate::diagnose::Verdict;
 use crate::diagnose::answer::{Candidate, Diagnosis, Outlier};
 use crate::report::fit::{significant, with_unit};
@@ -27,8 +27,12 @@ pub(crate) fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
         });
     }
     out.extend(not_used(d));
-    // where no effect is named, the verdict says it
-    if !d.needs_temperature.is_empty() && !matches!(d.verdict, Verdict::Adequate | Verdict::Unexplained(_)) {
+    let beside_the_verdict = match d.verdict {
+        Verdict::Adequate => true,
+        Verdict::Unexplained(_) => may_be_the_room(d),
+        _ => false,
+    };
+    if !d.needs_temperature.is_empty() && !beside_the_verdict {
         out.push(format!("cannot be measured without temperatures in the log: {}", d.needs_temperature.join(", ")));
     }
     let unseen: Vec<&str> =

@@ -72,7 +72,7 @@ fn ranks_of_the_papers_programs() {
     for (programs, rank) in [(&["head", "table"][..], 39), (&["head"], 29), (&["table"], 13)] {
         let runs: Vec<Planned> = programs.iter().map(|p| plan(&machine, p)).collect();
         let view = LinearisedPlan::of_model(&task(&machine, &catalogue, &DEFAULT), &runs, &[], NOISE).unwrap();
-        assert_eq!(view.base.rank(), rank, "{programs:?}");
+        assert_eq!(view.base().rank(), rank, "{programs:?}");
     }
 }
 
@@ -282,7 +282,7 @@ fn followed_by_warm_up(tau_h: f64, own_pace: bool) -> f64 {
     let effects = ["spindle-growth", "warm-up"].map(|id| (catalogue.get(id, &machine).unwrap(), Some(tau_h)));
     let view =
         LinearisedPlan::with_effects(&task(&machine, &catalogue, &DEFAULT), &runs, &[], NOISE, &effects).unwrap();
-    let columns = view.base.project_columns(&view.library.matrix().into_owned());
+    let columns = view.base().project_columns(&view.library.matrix().into_owned());
     let (growth, warm) = (columns.columns(0, 1).into_owned(), columns.columns(1, 3).into_owned());
     let left = axiscal::search::Basis::new(&warm).project_columns(&growth);
     1.0 - (left.norm() / growth.norm()).powi(2)

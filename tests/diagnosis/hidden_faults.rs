@@ -112,19 +112,22 @@ fn hidden_faults_are_in_the_first_groups() {
 }
 
 /// All eight kinds on the paper's plan of each machine; on `full` the example counts them. Ten index positions of a head cannot
-/// tell a warm room from scatter: there the first step asks for the temperatures, and the second names the cause.
+/// tell a warm room from scatter: there the first step asks for the temperatures, and the second names the cause. So it does where
+/// a drift is seen that no effect explains (`full`).
 #[test]
 fn every_set_up_mistake_is_led_to_its_cause_within_two_steps() {
     let mut with_temperatures = Vec::new();
+    let room = "temperature not logged while the frame bends with it";
+    let on_full = MISTAKES.iter().filter(|m| m.what == room).map(|m| (Bench::of("trunnion", true), m));
     let cases = Bench::all(false).into_iter().flat_map(|bench| MISTAKES.iter().map(move |m| (bench.clone(), m)));
-    for (bench, mistake) in cases {
+    for (bench, mistake) in cases.chain(on_full) {
         let led = judge::mistake(&bench, mistake, 56);
         assert!(led.led, "{led:?}");
         if led.gave_temperatures {
             with_temperatures.push((led.bench, led.what));
         }
     }
-    let room = "temperature not logged while the frame bends with it";
-    let expected = ["swivel-head paper", "double-head paper"].map(|bench| (bench.to_owned(), room));
+    let expected = ["swivel-head paper", "double-head paper", "trunnion full"].map(|bench| (bench.to_owned(), room));
     assert!(with_temperatures.iter().all(|case| expected.contains(case)), "{with_temperatures:?}");
+    assert!(with_temperatures.contains(&expected[2]), "a slow drift that nothing explains may be the room");
 }

@@ -27,7 +27,12 @@ pub struct Mistake {
 const TOUCH_UM: f64 = 1.0;
 
 pub const MISTAKES: [Mistake; 8] = [
-    Mistake { what: "ball radius typed 0.05 mm wrong", expects: &["pretravel"], make: ball_radius, with_temperatures: None },
+    Mistake {
+        what: "ball radius typed 0.05 mm wrong",
+        expects: &["pretravel"],
+        make: ball_radius,
+        with_temperatures: None,
+    },
     Mistake {
         what: "pivot or axis 0.5 mm wrong in the machine file",
         expects: &["location-a", "location-b", "location-c", "tool-length"],
@@ -46,8 +51,18 @@ pub const MISTAKES: [Mistake; 8] = [
         make: oversize,
         with_temperatures: None,
     },
-    Mistake { what: "one block turned by 2 degrees", expects: &["block-setup"], make: turned_block, with_temperatures: None },
-    Mistake { what: "a probe with a ball of 5 mm instead of 6 mm", expects: &["pretravel"], make: wrong_probe, with_temperatures: None },
+    Mistake {
+        what: "one block turned by 2 degrees",
+        expects: &["block-setup"],
+        make: turned_block,
+        with_temperatures: None,
+    },
+    Mistake {
+        what: "a probe with a ball of 5 mm instead of 6 mm",
+        expects: &["pretravel"],
+        make: wrong_probe,
+        with_temperatures: None,
+    },
     Mistake {
         what: "temperature not logged while the frame bends with it",
         expects: &["ambient-bending", "drift-linear", "warm-up"],

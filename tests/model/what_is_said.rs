@@ -168,7 +168,7 @@ fn a_room_that_goes_on_parts_nothing_from_time() {
         });
         let runs: Vec<design::Planned> = std::iter::once(made.clone()).chain(next).collect();
         let view = design::LinearisedPlan::with_effects(&task, &runs, &[], noise, &effects).unwrap();
-        let products = Products::new(&view.base, &view.library.matrix().into_owned());
+        let products = Products::new(view.base(), &view.library.matrix().into_owned());
         let span = |i: usize| view.library.candidates()[i].variants[0].columns.clone();
         products.left(&span(0), None, Some(&span(1))).lambda
     };
