@@ -15,7 +15,7 @@ pub use lock::{Lock, lock};
 pub use size::{enough_memory, max_input, read_size, set_max_input};
 
 use crate::diag::{Failure, Result};
-use std::io::Write;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// The bytes of a file.
@@ -127,7 +127,7 @@ pub fn write_together(files: &[(PathBuf, &[u8])]) -> Result<()> {
 /// When it is there and cannot be removed.
 pub fn remove(path: &Path) -> Result<()> {
     match std::fs::remove_file(path) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+        Err(e) if e.kind() != ErrorKind::NotFound => {
             Err(Failure::new("files::remove", format!("cannot remove {}: {e}", path.display()))
                 .help("check that you may write there"))
         }
@@ -191,9 +191,49 @@ fn folder_of(path: &Path) -> &Path {
 }
 
 fn unwritable(path: &Path, e: &std::io::Error) -> Failure {
-    // `tempfile` puts the name of the temporary file around the reason; the user has not asked for that name
-    let cause = e.get_ref().and_then(std::error::Error::source).and_then(|s| s.downcast_ref::<std::io::Error>());
-    let reason = cause.unwrap_or(e);
-    Failure::new("file::unwritable", format!("cannot write {}: {reason}", path.display()))
-        .help("is every part of the path a folder, and may you write there?")
+    // `tempfile` puts the name of the temporary file beside the reason; the user has not asked for that name
+    let is_wrapped = e.get_ref().is_some() && e.kind() != ErrorKind::Other;
+    let reason = if is_wrapped { e.kind().to_string() } else { e.to_string() };
+    Failure::new("file::unwritable", format!("cannot write {}: {reason}", path.display())).help(remedy(e.kind()))
+}
+
+/// What to do where a file cannot be written.
+fn remedy(why: ErrorKind) -> &'static str {
+    match why {
+        ErrorKind::PermissionDenied => "you may not write there: choose another folder, or change its permissions",
+        ErrorKind::ReadOnlyFilesystem => "this disk can only be read: choose a folder on another disk",
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            "the disk is full: free some space, or choose another disk"
+        }
+        _ => "is every part of the path a folder, and may you write there?",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_remedy_fits_the_reason() {
+        for (kind, word) in [
+            (ErrorKind::PermissionDenied, "permissions"),
+            (ErrorKind::ReadOnlyFilesystem, "only be read"),
+            (ErrorKind::StorageFull, "the disk is full"),
+            (ErrorKind::NotADirectory, "every part of the path"),
+        ] {
+            let Failure(findings) = unwritable(Path::new("out"), &kind.into());
+            let help = findings[0].help.clone().unwrap_or_default();
+            assert!(help.contains(word), "{kind}: {help}");
+        }
+    }
+
+    #[test]
+    fn the_name_of_a_temporary_file_is_not_shown() {
+        let folder = tempfile::tempdir().unwrap();
+        let gone = folder.path().join("gone");
+        let error = temporary::file_in(&gone).unwrap_err();
+        assert!(error.to_string().contains(" at path "), "{error}");
+        let Failure(findings) = unwritable(Path::new("out"), &error);
+        assert!(!findings[0].message.contains("axiscal-tmp"), "{}", findings[0].message);
+    }
 }

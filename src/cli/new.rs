@@ -5,6 +5,7 @@ use super::common::MachineArgs;
 use super::{Answer, Io};
 use crate::diag::{Failure, Result};
 use crate::files;
+use crate::words::command::quoted_path;
 use crate::workflow::load_plan;
 use crate::workflow::new::{Beside, NewRun, NewStudy, default_effects};
 use crate::workflow::overlay::Overlay;
@@ -97,7 +98,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
         made.says.iter().for_each(|line| io.say(line));
     }
     io.say(format!("{}: {} run(s), model: {}", args.out.display(), runs.len(), effects.join(", ")));
-    io.say(format!("next: axiscal identify {}", args.out.display()));
+    io.say_as_it_is(format!("next: axiscal identify {}", quoted_path(&args.out)));
     let mut answer = json!({ "study": args.out.display().to_string(), "runs": runs.len(), "effects": effects });
     if let Some(made) = &made {
         answer["centres"] = made.record.clone();

@@ -40,7 +40,7 @@ pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     io.say(format!(
         "put effects_file = [\"{}\"] into the study, above the first [[data]], then: axiscal add {} {}",
         relative(&args.out, loaded.folder()),
-        args.study.display(),
+        crate::words::command::quoted_path(&args.study),
         made.id
     ));
     for (i, t) in made.tried.iter().take(6).enumerate() {

@@ -7,6 +7,17 @@ use serde::Serialize;
 /// The format line of a diagnosis.
 pub const FORMAT: &str = "axiscal-diagnosis/1";
 
+/// The model on all touches, those that are not used included.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AllTouches {
+    /// Touches that were put back.
+    pub put_back: usize,
+    /// √(Σr²/n) over all touches, µm.
+    pub rms_um: f64,
+    /// Cross-validated error, µm.
+    pub held_out_rms_um: Option<f64>,
+}
+
 /// The answer of `diagnose`.
 #[derive(Debug, Clone, Serialize)]
 pub struct Diagnosis {
@@ -23,6 +34,9 @@ pub struct Diagnosis {
     pub held_out_rms_um: Option<f64>,
     /// Standard error of that, µm.
     pub held_out_se_um: Option<f64>,
+    /// Where the question was asked with the touches that are not used put back: the candidates are judged on all of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub all_touches: Option<AllTouches>,
     /// Standard deviation of a touch, µm.
     pub noise_um: f64,
     /// Scatter of index visits that the tests allow for, µm.
@@ -346,6 +360,7 @@ pub(crate) mod tests {
             rms_um: 5.0,
             held_out_rms_um: None,
             held_out_se_um: None,
+            all_touches: None,
             noise_um: 1.0,
             visit_um: 0.0,
             visit_source: VisitSource::Declared,

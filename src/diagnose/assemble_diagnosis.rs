@@ -232,6 +232,7 @@ pub(super) fn put_together(
         rms_um: fit.outcome.rms_um,
         held_out_rms_um: seen.folds.model().map(|h| h.rms_um),
         held_out_se_um: seen.folds.model().and_then(|h| h.standard_error_um),
+        all_touches: None,
         noise_um: noise_um(fit),
         visit_um: um_from_mm(seen.evidence.tau_mm),
         visit_source: fit.noise.visit_source,

@@ -228,8 +228,12 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         scatter: scatter(fit, machine, &evidence),
     };
     if beside.gathered.is_some()
-        && let Some(answer) = with_all_touches(subject, options)?
+        && let Some(mut answer) = with_all_touches(subject, options)?
     {
+        // the model's own figures are those of the touches that it uses, as in every other answer
+        let own = seen.folds.model();
+        (answer.held_out_rms_um, answer.held_out_se_um) =
+            (own.map(|h| h.rms_um), own.and_then(|h| h.standard_error_um));
         return Ok(answer);
     }
     let mut decision = decide::decide(&seen, &beside);
@@ -313,6 +317,13 @@ fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagno
     }
     answer.outliers = assemble_diagnosis::outliers(subject.fit);
     assemble_diagnosis::outliers_again(&mut answer, subject.fit, &fit);
+    answer.all_touches = Some(answer::AllTouches {
+        put_back: fit.n_used().saturating_sub(subject.fit.n_used()),
+        rms_um: answer.rms_um,
+        held_out_rms_um: answer.held_out_rms_um,
+    });
+    answer.rms_um = subject.fit.outcome.rms_um;
+    answer.says = crate::words::diagnose::verdict(&answer, &fit);
     Ok(Some(answer))
 }
 

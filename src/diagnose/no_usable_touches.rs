@@ -18,6 +18,7 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
         rms_um: fit.outcome.rms_um,
         held_out_rms_um: None,
         held_out_se_um: None,
+        all_touches: None,
         noise_um: noise_um(fit),
         visit_um: 0.0,
         visit_source: fit.noise.visit_source,

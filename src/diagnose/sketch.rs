@@ -129,7 +129,8 @@ fn write(
             i + 1,
             plain(typical)
         );
-        formula.push(format!("{size:+.2} {unit} * {text} [{} {dof}]", place.at));
+        let factor = if text.contains(' ') { format!("({text})") } else { text.clone() };
+        formula.push(format!("{size:+.2} {unit} * {factor} [{} {dof}]", place.at));
     }
     let mut toml = format!(
         "[[effect]]\nid = \"{id}\"                # give it a name of your own\nname = \"Sketch: {}\"\nsays = \"{}\"\nlook = \"{}\"\n{}at = \"{}\"\nterms = [\n{terms}]\n",

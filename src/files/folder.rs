@@ -198,6 +198,9 @@ impl Folder {
         // a process that stands in the old folder would stand in none
         let stands_in_it = std::env::current_dir().is_ok_and(|at| real_path(&at).starts_with(&self.real));
         if self.lock.is_none() || stands_in_it {
+            if !exists {
+                fs::create_dir(&self.real).map_err(failed)?;
+            }
             return Err(Stopped::Cannot);
         }
         let fresh = temporary::folder_in(folder_of(&self.real)).map_err(failed)?;

@@ -55,7 +55,7 @@ pub(super) fn assemble_result(
                 weak = poorly_determined::poorly_determined(fit, effects, &normal.gram);
             }
             let held_out = || held_out::by_visit_of(fit, touches, normal).map(|h| h.rms_um);
-            let with_all = || left_out.map(|all| uncertainty::with_unmodelled(fit, touches, all));
+            let with_all = || left_out.map(|all| uncertainty::with_unmodelled(fit, all));
             (unmodelled, held_out_rms_um) = rayon::join(with_all, held_out);
         });
     }

@@ -89,6 +89,26 @@ impl Fit {
         f(&touches)
     }
 
+    /// Calls `f` with the touches where an errorless machine makes them on artefacts in their places, as the columns of effects that the
+    /// model leaves out are made: a sphere that stands elsewhere is touched with other normals, and what cannot be told apart
+    /// would look as if it could. `f` gets the free unknowns, too.
+    pub(super) fn with_nominal_touches<T>(&self, f: impl FnOnce(&Touches, &DVector<f64>) -> T) -> T {
+        let mut theta = self.theta.clone();
+        for (value, (start, unknown)) in theta.iter_mut().zip(self.model.start().into_iter().zip(&self.model.unknowns))
+        {
+            if unknown.is_set_up() {
+                *value = start;
+            }
+        }
+        let held = |i: usize| self.free.binary_search(&i).is_err();
+        let batch = self.model.prepare_holding(&self.data.nominal, &theta, &held);
+        let free = DVector::from_iterator(self.free.len(), self.free.iter().map(|&i| theta[i]));
+        let noise_mm = (self.noise.sigma_mm, self.noise.tau_mm);
+        let mut touches = Touches::new(&batch, &self.data.visits, theta.clone(), &self.free, &self.priors, noise_mm);
+        touches.set_weights(self.weight.clone());
+        f(&touches, &free)
+    }
+
     /// What whitens columns of all touches, with a given scatter of visits, mm.
     #[must_use]
     pub fn whitening(&self, tau_mm: f64) -> Whitening {

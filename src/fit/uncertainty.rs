@@ -176,13 +176,16 @@ fn typical_columns(model: &Model, observations: &[Observation]) -> DMatrix<f64> 
 /// Standard uncertainty of each free unknown when everything that the model leaves out may act at its typical size, and the
 /// ball's place scatters from one index to the next as far as that is known; and what is said of effects that could not be
 /// counted.
-pub(super) fn with_unmodelled(fit: &Fit, touches: &Touches, left_out: LeftOut) -> Unmodelled {
-    let theta = fit.free_theta();
+pub(super) fn with_unmodelled(fit: &Fit, left_out: LeftOut) -> Unmodelled {
+    fit.with_nominal_touches(|touches, theta| unmodelled_at(fit, touches, theta, left_out))
+}
+
+fn unmodelled_at(fit: &Fit, touches: &Touches, theta: &DVector<f64>, left_out: LeftOut) -> Unmodelled {
     let LeftOut { model, without_value } = left_out;
     let (p, q) = (fit.free.len(), model.n_unknowns());
     let mut sums = Sums { gram: DMatrix::zeros(p, p), cross: DMatrix::zeros(p, q), inner: DMatrix::zeros(q, q) };
     let jacobian = |rows: &[usize]| {
-        let mut jacobian = touches.unwhitened_of(&theta, rows).1;
+        let mut jacobian = touches.unwhitened_of(theta, rows).1;
         touches.whiten_of(rows, &mut jacobian);
         jacobian
     };
@@ -190,7 +193,7 @@ pub(super) fn with_unmodelled(fit: &Fit, touches: &Touches, left_out: LeftOut) -
     // the touches themselves
     let columns = |part: &Range<usize>| {
         let rows: Vec<usize> = part.clone().collect();
-        let mut b = typical_columns(&model, &fit.data.observations[part.clone()]);
+        let mut b = typical_columns(&model, &fit.data.nominal[part.clone()]);
         touches.whiten_of(&rows, &mut b);
         (jacobian(&rows), b)
     };

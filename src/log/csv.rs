@@ -6,6 +6,7 @@
 
 use super::finding_places::{Capped, Places};
 use super::numbers::{number, whole};
+use super::temperatures;
 use super::text_lines::Lines;
 use super::touch::{RawTouch, Status, Touch};
 use crate::axes::{AxisName, Position};
@@ -66,6 +67,7 @@ pub fn read(bytes: &[u8], name: &str) -> Result<(Vec<RawTouch>, Findings)> {
         }
     }
     findings.0.extend(faults.drain("lines that are not understood", "log::not_understood"));
+    findings.0.extend(temperatures::unusual(&touches, &places));
     if touches.is_empty() {
         findings.push(places.at_line(Finding::error("log::nothing", "no touch in the file").help(FORM), 1));
     }
@@ -113,9 +115,6 @@ pub(super) fn decimal_mark<'a>(lines: impl Iterator<Item = &'a [u8]>) -> u8 {
     }
     if comma && !point { b',' } else { b'.' }
 }
-
-/// Nothing is colder, °C.
-const ABSOLUTE_ZERO_DEG_C: f64 = -273.15;
 
 type At = (std::ops::Range<usize>, String);
 
@@ -165,7 +164,9 @@ fn touch(line: &[u8], line_number: usize, columns: &[Column], separator: u8, mar
                 out.present[axis.index()] = true;
             }
             Column::Time => out.time_s = Some(value.value),
-            Column::Temperature if value.value < ABSOLUTE_ZERO_DEG_C => return Err(wrong("a temperature in °C")),
+            Column::Temperature if !temperatures::USABLE_DEG_C.contains(&value.value) => {
+                return Err(wrong(temperatures::EXPECTED));
+            }
             Column::Temperature => out.temperature_deg_c = Some(value.value),
             Column::Status => {}
         }

@@ -5,6 +5,7 @@
 //! and writes the project's own form. Nothing is silently left out: what is not used is a finding with its place.
 
 pub mod centres;
+mod clock;
 pub mod csv;
 mod finding_places;
 mod found;
@@ -20,6 +21,7 @@ mod reader;
 mod record;
 mod runs;
 mod setup_mistakes;
+mod temperatures;
 mod text_lines;
 pub mod touch;
 
@@ -143,6 +145,7 @@ pub fn read_run(
     let (mut touches, more) = matching::match_at(machine, here, parsed.touches, form, Some(&places), &parsed.rejected)
         .map_err(|f| joined(&findings, f))?;
     findings.0.extend(more.0);
+    clock::check(plan, &touches, &places, &mut findings);
     touches.iter_mut().for_each(|t| t.digit_mm = digit_mm);
     if !touches.iter().any(|t| t.status == Status::Hit) {
         findings.push(

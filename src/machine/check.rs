@@ -150,6 +150,7 @@ impl Check<'_> {
             }
             self.linear_axes_span_space(&here, name, &axes);
             self.linear_axes_square(name, &loose);
+            self.linear_axes_follow_r(&here, name, &axes);
             let n_rotary = axes.iter().filter(|a| a.name.is_rotary()).count();
             if n_rotary == 0 || n_rotary > 2 {
                 self.error(
@@ -263,6 +264,7 @@ impl Check<'_> {
                     .at(self.source, here.clone()),
             );
         }
+        self.assumed_sense(&here, name, &m.axis);
         // identical for identical contents: the debug form of the record, not the bytes with their comments
         let sha256 = format!(
             "{:x}",
@@ -291,6 +293,21 @@ impl Check<'_> {
             assumed_indexing,
             sha256,
         })
+    }
+
+    /// Says of which rotary axes the direction of rotation is not written: +1 is taken.
+    fn assumed_sense(&mut self, here: &Range<usize>, machine: &str, axes: &[w::Axis]) {
+        let unwritten = axes.iter().filter(|a| a.name.get_ref().is_rotary() && a.sense.is_none());
+        let letters: Vec<String> = unwritten.map(|a| a.name.get_ref().to_string()).collect();
+        if letters.is_empty() {
+            return;
+        }
+        let says = format!("sense of {} of {machine:?} is +1, since the file does not say it", letters.join(" and "));
+        self.findings.push(
+            Finding::info("machine::assumed_sense", says)
+                .help("check the sign at the machine, then write sense = 1 or sense = -1 (docs/guide/machines.md)")
+                .at(self.source, here.clone()),
+        );
     }
 
     fn exactly_one<'m, T>(
@@ -361,7 +378,11 @@ impl Check<'_> {
                 );
                 None
             }
-            Some(d) => self.direction(&d.span(), &format!("direction of axis {name}"), *d.get_ref()),
+            Some(d) => {
+                let direction = self.direction(&d.span(), &format!("direction of axis {name}"), *d.get_ref());
+                self.letter_of_rotary(&d.span(), name, direction.as_ref());
+                direction
+            }
         };
         let point = match (&a.point, name.is_rotary()) {
             (Some(p), true) => self.finite3(&p.span(), &format!("point of axis {name}"), *p.get_ref()),
@@ -485,6 +506,28 @@ impl Check<'_> {
             return None;
         }
         Some(v.into())
+    }
+
+    /// The location errors of a rotary axis are chosen by its letter, square to X, Y or Z: an axis that is square to its letter's
+    /// direction would have the wrong ones.
+    fn letter_of_rotary(&mut self, span: &Range<usize>, name: AxisName, direction: Option<&Unit<Vector3<f64>>>) {
+        /// Cosine of 60 degrees: an axis at 45 degrees may have either of two letters.
+        const LEAST_COSINE: f64 = 0.5;
+        let Some(direction) = direction.filter(|_| name.is_rotary()) else { return };
+        let (own, letters) = (name.index() % 3, ["A", "B", "C"]);
+        if direction[own].abs() < LEAST_COSINE {
+            let fits: Vec<&str> = (0..3).filter(|k| direction[*k].abs() >= LEAST_COSINE).map(|k| letters[k]).collect();
+            self.error(
+                span,
+                "machine::letter",
+                format!(
+                    "axis {name} is more than 60 degrees off {}, about which an axis of this letter turns: its errors would get \
+                     the wrong names",
+                    ["X", "Y", "Z"][own]
+                ),
+                format!("correct the direction, or name the axis {} (ISO 841)", fits.join(" or ")),
+            );
+        }
     }
 
     pub(super) fn direction(&mut self, span: &Range<usize>, what: &str, v: [f64; 3]) -> Option<Unit<Vector3<f64>>> {

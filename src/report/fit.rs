@@ -135,7 +135,7 @@ fn answer(o: &Outcome, results: &[&Parameter]) -> String {
         "{determined} ({}).\nThe residual is {} µm RMS{times}, over {} touches.\n",
         o.machine,
         significant(o.rms_um),
-        o.touches
+        o.touches.saturating_sub(o.rejected.len())
     );
     if let Some(held_out) = o.held_out_rms_um {
         out += &format!("The cross-validated error is {} µm RMS.\n", significant(held_out));

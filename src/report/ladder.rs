@@ -90,6 +90,16 @@ pub fn change(
     }
     // less than a thousandth of a nanometre is the arithmetic's
     const NOTHING_UM: f64 = 1e-6;
+    // with more unknowns the same touches leave less: other touches were excluded
+    if after.unknowns > before.unknowns && after.rms_um > before.rms_um + NOTHING_UM {
+        let line = format!(
+            "the residual rises, because the model with it excludes other touches: {} are not used before, {} after. Look at them \
+             before you keep this effect",
+            before.rejected.len(),
+            after.rejected.len()
+        );
+        out += &format!("{}\n", sentence(&line, paper.width, 0, 0));
+    }
     if doubt.fall.is_some_and(|(fall, _)| fall.abs() < NOTHING_UM) {
         out += "the cross-validated error stays the same: the change has no effect on these touches\n";
     } else if let Some((fall, se)) = doubt.fall {

@@ -21,8 +21,8 @@ const LARGEST_SHIFT_MM: f64 = 1e3;
 /// A clock shows seconds since anything up to the year 1 (64e9 s ago).
 const CLOCK_S: [f64; 2] = [0.0, 1e11];
 
-/// A workshop, with room to play.
-const WEATHER_DEG_C: [f64; 2] = [-273.15, 1000.0];
+/// A workshop, with room to play: what a log may hold.
+const WEATHER_DEG_C: [f64; 2] = [-50.0, 100.0];
 
 type Table<'a> = DeTable<'a>;
 type Node<'a> = Spanned<DeValue<'a>>;

@@ -66,7 +66,8 @@ pub struct MaskAsWritten {
     #[schemars(with = "usize")]
     pub run: Spanned<usize>,
     /// Number in the plan.
-    pub id: u64,
+    #[schemars(with = "u64")]
+    pub id: Spanned<u64>,
     /// Why.
     pub reason: String,
 }
@@ -188,6 +189,13 @@ pub struct DataEntry {
 fn misplaced(error: &toml::de::Error) -> Option<&'static str> {
     let word = error.message().strip_prefix("unknown field `")?.split('`').next()?;
     ["effects_file", "machine", "machines"].into_iter().find(|key| *key == word)
+}
+
+/// Where the number of a masked touch is in the study's text. `nth` counts all `[[mask]]`, from 0.
+#[must_use]
+pub fn place_of_mask(source: &Source, nth: usize) -> Option<std::ops::Range<usize>> {
+    let written: AsWritten = toml::from_str(source.inner()).ok()?;
+    written.mask.get(nth).map(|m| m.id.span())
 }
 
 /// The stretches of a run in which the spindle ran.
@@ -318,7 +326,7 @@ impl Study {
         let mut masked = Vec::new();
         for m in &w.mask {
             match m.run.get_ref().checked_sub(1).filter(|run| *run < data.len()) {
-                Some(run) => masked.push(Mask { run, id: m.id, reason: m.reason.clone() }),
+                Some(run) => masked.push(Mask { run, id: *m.id.get_ref(), reason: m.reason.clone() }),
                 None => findings.push(
                     Finding::error("study::mask", format!("there is no run {}", m.run.get_ref()))
                         .help(format!("runs are counted from 1; the study has {}", data.len()))

@@ -171,6 +171,9 @@ pub struct Tables {
     /// holds such a value; `vectors` and `grids` then say what the control would hold if it held the machine's description before.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub changes: BTreeMap<String, f64>,
+    /// Offsets that the lines hold in place of turns of the head, for which the control has no place.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub of_turns: Vec<Term>,
     /// By rotary axis: the coordinate at which it really stands at zero, deg.
     #[serde(default)]
     pub zero_deg: BTreeMap<AxisName, f64>,

@@ -1,5 +1,6 @@
 //! Findings in the words of the shop floor.
 
+use crate::diagnose::answer::{Finding, Where};
 use crate::diagnose::features::direction_words;
 use crate::diagnose::next_step::MachineCheck;
 use crate::diagnose::oversized::Oversized;
@@ -279,7 +280,18 @@ fn answer(d: &Diagnosis, fit: &Fit) -> String {
 }
 
 fn adequate(d: &Diagnosis, fit: &Fit) -> String {
-    let fits = format!("The model is complete as far as these touches can measure: {}.", against(d));
+    /// So small a probability of the misfit is said, though no effect is named: one clean machine in a hundred has it.
+    const MORE_THAN_NOISE: f64 = 0.01;
+    let fits = if d.lack_of_fit_p < MORE_THAN_NOISE {
+        format!(
+            "No effect was found that is missing, but the residual is larger than the probe noise explains (p = {:.2} %): {}. \
+             Something small may be missing.",
+            100.0 * d.lack_of_fit_p,
+            against(d)
+        )
+    } else {
+        format!("The model is complete as far as these touches can measure: {}.", against(d))
+    };
     format!("{fits}{}{}", tested(d), without_temperature(d, fit))
 }
 
@@ -360,16 +372,42 @@ fn missing_effect(d: &Diagnosis, missing: &Missing) -> String {
                 ),
             };
             let it = if c.together_with.is_some() { "both" } else { "it" };
+            let (of, before_um) = match &d.all_touches {
+                None => (String::new(), d.rms_um),
+                Some(all) => (format!(" of all touches, with the {} that are not used now,", all.put_back), all.rms_um),
+            };
             format!(
-                "Missing: {what}.{which} With {it} the error falls from {:.2} to {:.2} µm RMS; the probe noise is {:.2} µm.{rest}{doubt}",
-                d.rms_um, c.rms_after_um, d.noise_um
+                "Missing: {what}.{which} With {it} the error{of} falls from {before_um:.2} to {:.2} µm RMS; the probe noise is {:.2} \
+                 µm.{rest}{doubt}",
+                c.rms_after_um, d.noise_um
             )
         }
     }
 }
 
+/// On what the residual depends: the first, what goes with it as much, and where the touches lie that are not used.
+fn depends_on(d: &Diagnosis) -> String {
+    /// Shares that differ by less are equal.
+    const AS_MUCH: f64 = 0.03;
+    let Some(first) = d.depends.first() else { return String::new() };
+    let mut out = first.says.clone();
+    let of_touches = |w: &&Where| w.finding == Finding::Outliers;
+    let rival = d.depends[1..].iter().find(|w| !of_touches(w) && w.share > first.share - AS_MUCH);
+    if let Some(rival) = rival {
+        out += &format!(
+            ". {} explains as much ({:.0} %)",
+            super::headline::capital(&plain(&rival.by)),
+            100.0 * rival.share
+        );
+    }
+    if let Some(heap) = d.depends[1..].iter().find(of_touches) {
+        out += &format!(". {}", heap.says);
+    }
+    out
+}
+
 fn not_explained(d: &Diagnosis, unexplained: &Unexplained, fit: &Fit) -> String {
-    let depends = d.depends.first().map_or("", |w| w.says.as_str());
+    let depends = &depends_on(d);
     let mistake = d.gross.first().filter(|g| g.rms_um < setup_mistakes::RIGHT * d.rms_um);
     let cause = match mistake {
         Some(mistake) => format!(" Probable cause: {}.", mistake.says),
@@ -379,10 +417,10 @@ fn not_explained(d: &Diagnosis, unexplained: &Unexplained, fit: &Fit) -> String 
     let missing = format!("Something is missing in the model: {}.", against(d));
     match &unexplained.why {
         NotNamed::WeakPattern => {
-            let pattern = if depends.is_empty() { "a weak pattern" } else { depends };
             format!(
-                "The model fits within the noise: {}. A weak pattern is left: {pattern}. Measure more touches to see whether it is real.",
-                against(d)
+                "The model fits within the noise: {}. {}. Measure more touches to see whether it is real.",
+                against(d),
+                weak_pattern(depends)
             )
         }
         NotNamed::Scatter => format!("{depends}. The residual is {}.", against(d)),
@@ -391,11 +429,8 @@ fn not_explained(d: &Diagnosis, unexplained: &Unexplained, fit: &Fit) -> String 
                 true => "A pattern that no listed effect explains fits clearly better",
                 false => "Several patterns that no listed effect explains fit clearly better together",
             };
-            format!(
-                "{missing} No listed effect explains all of it. A part of it looks like {} ({:.0} %). {patterns}.{cause}",
-                candidate_names(d),
-                d.candidates.first().map_or(0.0, |c| (100.0 * c.share).round())
-            )
+            let part = looks_like(&candidate_names(d), d.candidates.first().map_or(0.0, |c| c.share));
+            format!("{missing} No listed effect explains all of it. {part}. {patterns}.{cause}")
         }
         NotNamed::NotConfirmed => format!(
             "{missing} It may be {}: it passes the test, but unused measurements do not confirm it, so no effect is named.{cause} \
@@ -418,6 +453,24 @@ fn not_explained(d: &Diagnosis, unexplained: &Unexplained, fit: &Fit) -> String 
             let or = or.map_or_else(String::new, |or| format!(" {or}"));
             format!("{missing} No listed effect explains it.{or}{cause}")
         }
+    }
+}
+
+/// The pattern that is left within the noise. `depends` says what it depends on, and is empty where nothing was found.
+fn weak_pattern(depends: &str) -> String {
+    match depends {
+        "" => "A weak pattern is left that depends on nothing that these touches show".to_owned(),
+        depends => format!("A weak pattern is left: {depends}"),
+    }
+}
+
+/// How much of the residual an effect explains that does not explain all of it.
+fn looks_like(names: &str, share: f64) -> String {
+    let percent = (100.0 * share).round();
+    if percent >= 100.0 {
+        format!("Nearly all of it looks like {names}")
+    } else {
+        format!("A part of it looks like {names} ({percent:.0} %)")
     }
 }
 
@@ -578,6 +631,14 @@ pub fn beyond_noise(p_adjusted: f64) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_pattern_says_what_it_depends_on_and_a_part_is_less_than_all() {
+        assert_eq!(weak_pattern(""), "A weak pattern is left that depends on nothing that these touches show");
+        assert_eq!(weak_pattern("40 % depends on C"), "A weak pattern is left: 40 % depends on C");
+        assert_eq!(looks_like("radial-a-2", 0.998), "Nearly all of it looks like radial-a-2");
+        assert_eq!(looks_like("radial-a-2", 0.994), "A part of it looks like radial-a-2 (99 %)");
+    }
 
     #[test]
     fn variables_and_groups_have_names() {

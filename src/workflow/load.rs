@@ -5,7 +5,7 @@ use super::history::history_path;
 use super::read_run::{LogFile, ReadPlan, controller_path, touches_of_run};
 use super::{Disk, Environment};
 use crate::design::{Planned, keep_measured};
-use crate::diag::{Failure, Finding, Findings, Result, Source, shown, source};
+use crate::diag::{Failure, Finding, Findings, Result, SHOWN, Source, shown, source};
 use crate::fit::{self, Fit, Settings};
 use crate::log::Touch;
 use crate::machine::{self, Machine};
@@ -14,8 +14,9 @@ use crate::model::data::{Data, Run, assemble_with_spindle};
 use crate::model::spindle::SpindleStretch;
 use crate::post::Postprocessor;
 use crate::program::plan::Plan;
-use crate::study::Study;
+use crate::study::{Study, place_of_mask};
 use sha2::{Digest, Sha256};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -280,6 +281,7 @@ pub fn load_study(path: &Path, env: &dyn Environment) -> Result<Loaded> {
             compensation: entry.compensation.as_ref().map(|c| folder.join(c)),
         });
     }
+    masks_are_planned(&study, &runs, &src)?;
     crate::files::enough_memory(runs.iter().map(|run: &LoadedRun| run.touches.len()).sum())?;
     let hexadecimal = |hash: Sha256| hash.finalize().iter().map(|b| format!("{b:02x}")).collect();
     Ok(Loaded {
@@ -292,6 +294,26 @@ pub fn load_study(path: &Path, env: &dyn Environment) -> Result<Loaded> {
         sha256: hexadecimal(hash),
         data_sha256: hexadecimal(data),
     })
+}
+
+/// Checks that each masked touch is in the plan of its run. One that only the log lacks is a remark of the fit.
+fn masks_are_planned(study: &Study, runs: &[LoadedRun], src: &Source) -> Result<()> {
+    let ids: Vec<BTreeSet<u64>> = runs.iter().map(|run| run.plan.touches.iter().map(|t| t.id).collect()).collect();
+    let mut findings = Findings::default();
+    for (nth, mask) in study.masked.iter().enumerate() {
+        if ids.get(mask.run).is_none_or(|ids| ids.contains(&mask.id)) {
+            continue;
+        }
+        let says = format!("there is no touch {} in the plan of run {}", mask.id, mask.run + 1);
+        let finding = Finding::error("study::mask", says).help("id is the number of the touch in the plan: correct it");
+        // the study is read again for each place
+        let place = if findings.0.len() < SHOWN { place_of_mask(src, nth) } else { None };
+        findings.push(match place {
+            Some(span) => finding.at(src, span),
+            None => finding,
+        });
+    }
+    findings.finish(()).map(drop).map_err(|failure| Failure(shown(&failure.0)))
 }
 
 /// What is wrong with a file that the study names gets the place of its name, where it has none of its own.

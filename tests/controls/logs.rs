@@ -87,6 +87,86 @@ fn every_log_of_the_corpus_gives_what_is_expected() {
     assert!(wrong.is_empty(), "{} of {} files give something else:\n{}", wrong.len(), CASES.len(), wrong.join("\n"));
 }
 
+/// The codes of the findings of a CSV with one column more, and the first message of each. `of` gives the column's text by
+/// the number of the row.
+fn with_column(column: &str, of: impl Fn(usize) -> String) -> (Vec<&'static str>, Vec<String>) {
+    with_corpus(|machine, plan| {
+        let mut long = plan.clone();
+        let nominal = plan.touches[0].clone();
+        long.touches = (0..20).map(|i| timed(&nominal, i)).collect();
+        let p = nominal.nominal_position();
+        let rows =
+            (0..20).map(|i| format!("{},{},{},{},{},{},{}\n", i + 1, p.0[0], p.0[1], p.0[2], p.0[4], p.0[5], of(i)));
+        let text = format!("id,X,Y,Z,B,C,{column}\n{}", rows.collect::<String>());
+        let findings = match log::read(text.as_bytes(), "t.csv", Writer::Csv, machine, &long) {
+            Ok((_, findings)) => findings.0,
+            Err(failure) => failure.0,
+        };
+        let says = findings.iter().map(|f| format!("{f}; {}", f.help.as_deref().unwrap_or_default()));
+        (findings.iter().map(|f| f.code).collect(), says.collect())
+    })
+}
+
+/// The touch of a plan that is made each 4 s.
+fn timed(touch: &axiscal::program::plan::PlanTouch, i: usize) -> axiscal::program::plan::PlanTouch {
+    axiscal::program::plan::PlanTouch { id: i as u64 + 1, time_s: Some(30.0 + 4.0 * i as f64), ..touch.clone() }
+}
+
+#[test]
+fn temperatures_of_another_unit_are_warned_of_or_not_used() {
+    let with = |of: &dyn Fn(usize) -> f64| with_column("temperature_degC", |i| of(i).to_string());
+    assert_eq!(with(&|i| 20.0 + i as f64).0, [] as [&str; 0]);
+    let (codes, says) = with(&|i| if i == 0 { 20.0 } else { 68.0 + 0.1 * i as f64 });
+    assert_eq!(codes, ["log::temperature"]);
+    for word in
+        ["t.csv:3:1: ", "outside 0 to 50 °C at 19 touches: 68.1 °C is the first", "are these values in °F or K?"]
+    {
+        assert!(says[0].contains(word), "{says:?}");
+    }
+    // in kelvins no line can be used; with one of them the others are
+    let (codes, says) = with(&|i| 293.15 + 0.1 * i as f64);
+    assert!(codes.contains(&"log::not_understood") && codes.last() == Some(&"log::nothing"), "{codes:?}");
+    assert!(says[0].contains("expected a temperature_degC from -50 to 100 °C"), "{says:?}");
+    let (codes, says) = with(&|i| if i == 4 { 2000.0 } else { 20.0 });
+    assert_eq!(codes, ["log::not_understood", "log::missing"]);
+    assert!(says[0].starts_with("t.csv:6:"), "{says:?}");
+}
+
+#[test]
+fn times_that_run_backward_or_are_no_seconds_are_warned_of() {
+    let with = |of: &dyn Fn(f64) -> f64| with_column("time_s", |i| of(7.0 + 4.0 * i as f64).to_string());
+    let good: [&dyn Fn(f64) -> f64; 5] = [
+        &|t| t,
+        &|t| 9.0 * t,
+        // the same night and the next morning
+        &|t| if t < 30.0 { t } else { t + 50_000.0 },
+        // a clock of whole minutes
+        &|t| (t / 60.0).floor() * 60.0,
+        &|t| 1e9 + t,
+    ];
+    for (i, of) in good.iter().enumerate() {
+        assert_eq!(with(of).0, [] as [&str; 0], "{i}");
+    }
+    for (factor, unit) in [(1000.0, "milliseconds"), (1.0 / 60.0, "minutes or hours"), (1.0 / 3600.0, "hours")] {
+        let (codes, says) = with(&|t| factor * t);
+        assert_eq!(codes, ["log::time_unit"], "{factor}");
+        assert!(says[0].starts_with("t.csv:2:1: ") && says[0].contains(unit), "{says:?}");
+        assert!(says[0].contains("and 76.000 s by the plan"), "{says:?}");
+    }
+    let (codes, says) = with(&|t| if t == 27.0 { 5.0 } else { t });
+    assert_eq!(codes, ["log::time_backward"]);
+    assert!(says[0].starts_with("t.csv:7:1: ") && says[0].contains("touch 6 has time_s = 5"), "{says:?}");
+    let (codes, says) = with(&|t| 5000.0 - t);
+    assert_eq!(codes, ["log::time_backward"]);
+    assert!(says[0].contains("this happens 18 more times"), "{says:?}");
+    // too few to see it, and a log without times
+    assert_eq!(
+        with_column("time_s", |i| if i < 4 { (1000 * i).to_string() } else { String::new() }).0,
+        [] as [&str; 0]
+    );
+    assert_eq!(with_column("status", |_| "hit".to_owned()).0, [] as [&str; 0]);
+}
+
 #[test]
 fn a_log_of_an_earlier_version_is_read_with_a_remark() {
     let post = Postprocessor::load_built_in_or_file("linuxcnc").expect("shipped").0;

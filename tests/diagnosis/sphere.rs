@@ -131,3 +131,34 @@ fn temperatures_can_be_added_to_a_log() {
     std::fs::write(at.join("warm.toml"), study).unwrap();
     assert_eq!(needs("warm.toml"), 0);
 }
+
+/// A tool that is longer than the file says is one number with EZ0A, wherever in its tolerance the sphere was put.
+#[test]
+fn a_sphere_beside_its_place_hides_no_more() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let program = PROGRAM.replace("AZIMUTHS", "0, 72, 144, 216, 288");
+    std::fs::write(at.join("four.toml"), program).unwrap();
+    let machine = ["--machine", "trunnion", "--controller", "linuxcnc"];
+    ok(at, &[&["generate", "--program", "four.toml", "--artefact", "sphere", "--out", "."][..], &machine].concat());
+    let plan = ["--machines", "machines.toml", "--plan", "four.plan.json"];
+    let found = [0.0, 0.9].map(|mm| {
+        let wrong = format!(
+            "seed = 3\n[[block]]\nmounting = \"sphere\"\nname = \"ball\"\nshift = [{mm}, {mm}, {mm}]\n[noise]\ntouch_um = 1.0\n"
+        );
+        std::fs::write(at.join("wrong.toml"), wrong).unwrap();
+        for old in ["four.log", "study.toml"] {
+            let _ = std::fs::remove_file(at.join(old));
+        }
+        ok(at, &[&["simulate", "--scenario", "wrong.toml", "--out", "four.log"][..], &machine, &plan].concat());
+        ok(at, &[&["new", "--log", "four.log", "--out", "study.toml"][..], &machine, &plan].concat());
+        let (fit, _) = json(at, &["identify", "study.toml"]);
+        let all = fit["parameters"].as_array().unwrap();
+        all.iter().find(|p| p["name"] == "EZ0A").unwrap().clone()
+    });
+    for p in &found {
+        assert!(p["holds"].as_array().unwrap().iter().any(|id| id == "tool-length"), "{p}");
+    }
+    let [here, aside] = found.map(|p| p["sigma_with_unmodelled"].as_f64().unwrap());
+    assert!((here / aside - 1.0).abs() < 0.01 && here > 0.02, "{here} mm, beside its place {aside} mm");
+}

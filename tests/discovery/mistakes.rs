@@ -13,14 +13,17 @@ use rand_chacha::ChaCha8Rng;
 /// The touches of all runs, or why the program refuses them.
 pub type Logs = Result<Vec<Vec<Touch>>>;
 
+/// Makes the logs of a bench whose user made a mistake.
+pub type Make = fn(&Bench, &Act, &mut ChaCha8Rng) -> Logs;
+
 /// A mistake with the ids of the effects whose size gives it away.
 pub struct Mistake {
     pub what: &'static str,
     pub expects: &'static [&'static str],
     /// The logs that the program reads, or why it refuses them.
-    pub make: fn(&Bench, &Act, &mut ChaCha8Rng) -> Logs,
+    pub make: Make,
     /// The same touches after the user has given the temperatures that the verdict asked for, and the ids that may be named then.
-    pub with_temperatures: Option<(fn(&Bench, &Act, &mut ChaCha8Rng) -> Logs, &'static [&'static str])>,
+    pub with_temperatures: Option<(Make, &'static [&'static str])>,
 }
 
 /// Scatter of a touch and of an index position, µm.

@@ -362,6 +362,31 @@ fn a_study_without_a_touch_that_is_used() {
     }
 }
 
+/// A mask of a touch that no plan has is a wrong number. The next call after `new` can be copied as it is.
+#[test]
+fn a_masked_touch_must_be_in_the_plan() {
+    let job = Job::new();
+    let mut new = vec!["new", "--machine", "swivel-head", "--plan", "table.plan.json", "--log", "good.log"];
+    new.extend(["--controller", "linuxcnc", "--out", "studie ä.toml"]);
+    expect(&job.call(&new), 0, &["next: axiscal identify \"studie ä.toml\"\n"]);
+    let text = job.read("studie ä.toml");
+    let mask = |id: u32| format!("{text}\n[[mask]]\nrun = 1\nid = {id}\nreason = \"x\"\n");
+    let line = text.lines().count() + 4;
+    job.write("masked.toml", mask(9999));
+    let place = format!("masked.toml:{line}:6: ");
+    for verb in ["identify", "diagnose"] {
+        let says = "there is no touch 9999 in the plan of run 1";
+        expect(&job.call(&[verb, "masked.toml"]), 2, &[&place, says, "help:"]);
+    }
+    // the plan has it and the log does not: a remark
+    job.write("masked.toml", mask(2));
+    let log: String =
+        job.read("good.log").lines().filter(|l| !l.starts_with("P N2 ")).map(|l| format!("{l}\n")).collect();
+    assert_ne!(log, job.read("good.log"));
+    job.write("good.log", log);
+    expect(&job.call(&["identify", "masked.toml", "--verbose"]), 0, &["There is no touch 2 in run 1"]);
+}
+
 /// A reference point that no machine has is a slip of the keyboard: values stated there would be of no use.
 #[test]
 fn a_reference_beyond_any_machine_is_refused() {

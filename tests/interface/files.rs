@@ -218,6 +218,20 @@ fn an_export_replaces_its_own_files_alone() {
     assert_eq!(text(&comp, "axiscal.hal"), before);
 }
 
+/// Not even the super-user can make a folder in `/sys`.
+#[test]
+#[cfg(target_os = "linux")]
+fn an_export_says_why_its_folder_cannot_be_made() {
+    let dir = folder();
+    let (answer, code) = json(dir.path(), &[&EXPORT[..], &["/sys/axiscal-export"]].concat());
+    let findings = answer["findings"].as_array().unwrap();
+    let finding = findings.iter().find(|f| f["code"] == "file::unwritable").unwrap();
+    let (says, help) = (finding["says"].as_str().unwrap(), finding["help"].as_str().unwrap());
+    assert_eq!(code, 2);
+    assert!(says.starts_with("cannot write /sys/axiscal-export: ") && !says.contains("No such file"), "{says}");
+    assert!(!help.contains("every part of the path"), "{help}");
+}
+
 #[test]
 fn a_study_that_another_process_changes_is_not_changed() {
     let dir = folder();

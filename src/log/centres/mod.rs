@@ -10,6 +10,7 @@ mod stated;
 pub use stated::{Counted, Kind, Stated, unit_of};
 
 use super::numbers::{number, whole};
+use super::temperatures;
 use super::text_lines::{Line, Lines};
 use crate::axes::{AxisMap, AxisName};
 use crate::diag::{Finding, Findings, Result, Source};
@@ -212,7 +213,10 @@ fn row(line: &Line<'_>, header: &Header, mark: u8) -> Result<Option<CentreRow>, 
                 return Err(fault("a position of a machine", "is the decimal point missing?"));
             }
             Column::Time => out.time_s = Some(value),
-            Column::Temperature => out.temperature_deg_c = Some(value),
+            Column::Temperature if temperatures::USABLE_DEG_C.contains(&value) => out.temperature_deg_c = Some(value),
+            Column::Temperature => {
+                return Err(fault(temperatures::EXPECTED, "write degrees Celsius, or remove the column"));
+            }
             Column::Sigma if value > 0.0 && value <= 1e6 => out.sigma_um = Some(value),
             Column::Sigma => return Err(fault("µm, more than 0", "write the standard deviation of each coordinate")),
             Column::Run => out.run = Some(count()?),

@@ -1,9 +1,13 @@
 //! The axes as a chain: who bears whom, and do the linear ones span space.
 
 use super::{Check, LARGEST_SQUARENESS_DEG, Loose};
+use crate::axes::AxisName;
 use crate::diag::Finding;
 use crate::machine::{Axis, Side};
 use std::ops::Range;
+
+/// Cosine of 45 degrees: a linear axis that is further off the axis of its letter has another letter's direction.
+const LEAST_ALONG_ITS_LETTER: f64 = std::f64::consts::FRAC_1_SQRT_2 - 1e-9;
 
 impl Check<'_> {
     /// From an end (workpiece or tool) down to the base; the answer begins at the base.
@@ -58,6 +62,37 @@ impl Check<'_> {
                 "X, Y and Z must be there, roughly square to each other",
             );
         }
+    }
+
+    /// Frame R is right-handed, and each linear axis moves the tool over the workpiece along the axis of its letter. The
+    /// directions are those of this motion on both sides of the chain.
+    pub(super) fn linear_axes_follow_r(&mut self, here: &Range<usize>, machine: &str, axes: &[Axis]) {
+        let linear: Vec<&Axis> = axes.iter().filter(|a| !a.name.is_rotary()).collect();
+        let along = |a: &Axis| a.direction[a.name.index()];
+        let away: Vec<String> = linear
+            .iter()
+            .filter(|a| along(a) < LEAST_ALONG_ITS_LETTER)
+            .map(|a| format!("{} is [{:.2}, {:.2}, {:.2}]", a.name, a.direction.x, a.direction.y, a.direction.z))
+            .collect();
+        let by_letter = [AxisName::X, AxisName::Y, AxisName::Z].map(|n| linear.iter().find(|a| a.name == n));
+        let is_left_handed = match by_letter {
+            [Some(x), Some(y), Some(z)] => x.direction.cross(&y.direction).dot(&z.direction) < 0.0,
+            _ => false,
+        };
+        let mut wrong = Vec::new();
+        if !away.is_empty() {
+            wrong.push(format!("not along X, Y and Z of frame R ({})", away.join(", ")));
+        }
+        if is_left_handed {
+            wrong.push("left-handed".to_owned());
+        }
+        if wrong.is_empty() {
+            return;
+        }
+        let message = format!("the directions of the linear axes of {machine:?} are {}", wrong.join(", and "));
+        let help = "R is right-handed with X Y Z along the linear axes; a direction is that of the tool over the workpiece \
+                    for a positive move: with another one the errors get wrong signs or letters";
+        self.findings.push(Finding::warning("machine::not_along_r", message).help(help).at(self.source, here.clone()));
     }
 
     /// Every pair of linear axes, in the order of their letters.

@@ -43,6 +43,25 @@ fn a_range_is_written_in_machine_coordinates_and_kept_relative_to_r() {
     assert_eq!(machines[0].axis(AxisName::X).unwrap().range, [-550.0, 350.0]);
 }
 
+/// The errors of a rotary axis are named by its letter: B along X and Z would have none about its own inclination.
+#[test]
+fn a_letter_that_does_not_fit_its_direction_is_refused() {
+    let of = |direction: &str| {
+        let b = crate::machine::BUILT_IN.find("name = \"B\"").unwrap();
+        let (before, after) = crate::machine::BUILT_IN.split_at(b);
+        let after = after.replacen("direction = [0.0, 1.0, 0.0]", &format!("direction = {direction}"), 1);
+        match super::load(&source("m.toml", format!("{before}{after}"))) {
+            Ok((_, findings)) => findings.0.iter().map(|f| f.code).collect::<Vec<_>>(),
+            Err(failure) => failure.0.iter().map(|f| f.code).collect(),
+        }
+    };
+    assert_eq!(of("[1.0, 0.0, 1.0]"), ["machine::letter"]);
+    assert_eq!(of("[1.0, 0.0, 0.0]"), ["machine::letter"]);
+    for fits in ["[0.0, 1.0, 1.0]", "[0.0, -1.0, 0.0]", "[0.7, 0.8, 0.0]"] {
+        assert!(!of(fits).contains(&"machine::letter"), "{fits}");
+    }
+}
+
 /// Codes of what is wrong with the built-in machines when `from` is written as `to`, once.
 fn codes(from: &str, to: &str) -> Vec<&'static str> {
     let text = crate::machine::BUILT_IN.replacen(from, to, 1);
@@ -71,6 +90,43 @@ fn one_slip_is_one_finding() {
     for (from, to, code) in cases {
         assert_eq!(codes(from, to), [code], "{to}");
     }
+}
+
+#[test]
+fn linear_axes_go_along_their_letters_and_are_right_handed() {
+    let message = |from: &str, to: &str| {
+        let text = crate::machine::BUILT_IN.replacen(from, to, 1);
+        let (_, findings) = super::load(&source("m.toml", text)).unwrap();
+        let codes: Vec<&str> = findings.0.iter().map(|f| f.code).collect();
+        assert_eq!(codes, ["machine::not_along_r"], "{to}");
+        findings.0[0].message.clone()
+    };
+    let axis = |letter: &str, parent: &str, direction: &str| {
+        format!("name = \"{letter}\"\nparent = \"{parent}\"\nkind = \"linear\"\ndirection = {direction}")
+    };
+    let x = axis("X", "base", "[1.0, 0.0, 0.0]");
+    let mirrored = message(&x, &axis("X", "base", "[-1.0, 0.0, 0.0]"));
+    assert!(mirrored.ends_with("(X is [-1.00, 0.00, 0.00]), and left-handed"), "{mirrored}");
+    // turned by 90 degrees about Z: right-handed, and X is along Y
+    let text = crate::machine::BUILT_IN;
+    let (from, y) = (text.find(&x).unwrap(), axis("Y", "X", "[0.0, 1.0, 0.0]"));
+    let both = &text[from..from + text[from..].find(&y).unwrap() + y.len()];
+    let turned =
+        both.replace(&x, &axis("X", "base", "[0.0, 1.0, 0.0]")).replace(&y, &axis("Y", "X", "[-1.0, 0.0, 0.0]"));
+    let says = message(both, &turned);
+    assert!(says.contains("X is [0.00, 1.00, 0.00], Y is [-1.00, 0.00, 0.00]") && !says.contains("left"), "{says}");
+}
+
+#[test]
+fn a_direction_of_rotation_that_is_not_stated_is_said() {
+    let text = crate::machine::BUILT_IN.replacen("\nsense = 1\n", "\n", 1);
+    let (machines, findings) = super::load(&source("m.toml", text)).unwrap();
+    let codes: Vec<&str> = findings.0.iter().map(|f| f.code).collect();
+    assert_eq!(codes, ["machine::assumed_sense"]);
+    assert_eq!(findings.0[0].severity, crate::diag::Severity::Info);
+    let rotary = machines[0].rotary().next().unwrap();
+    assert!(findings.0[0].message.contains(" is +1, since the file does not say it"), "{}", findings.0[0].message);
+    assert_eq!(rotary.sense, 1.0);
 }
 
 #[test]

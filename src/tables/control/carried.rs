@@ -4,12 +4,15 @@ use super::backup::Old;
 use super::fill::{self, Filled, Value};
 use super::{axis_of, directions_of, workpiece};
 use crate::axes::AxisName;
-use crate::machine::{Machine, Side};
+use crate::geometry::{Transform, apply, rotation_about};
+use crate::machine::{Axis, Machine, Side};
 use crate::post::tables::{Kind, Tables, doubt};
 use crate::tables::compensation::Term;
-use crate::tables::correction::{Correction, rounded};
-use crate::tables::place::{Place, Spot, along, turns_about_itself};
+use crate::tables::correction::{Correction, blank, rounded};
+use crate::tables::kins::Errors;
+use crate::tables::place::{Dof, Place, Spot, along, turns_about_itself};
 use crate::tables::restate::stated_at;
+use nalgebra::Vector3;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// What the control can hold of the terms, where it holds them, and the rest with the reason.
@@ -24,6 +27,15 @@ pub(super) struct Carried {
     pub not: Vec<(Term, String)>,
     /// Places that a tilt would move, from where the study does not know.
     pub kept: Vec<Spot>,
+    /// Offsets that stand for turns of the head which the control cannot hold.
+    pub of_turns: Vec<Term>,
+}
+
+impl Carried {
+    /// What the control's lines hold.
+    pub fn in_lines(&self) -> Vec<Term> {
+        self.terms.iter().chain(&self.of_turns).cloned().collect()
+    }
 }
 
 pub(super) fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -> Carried {
@@ -33,8 +45,10 @@ pub(super) fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -
     let reference_mm = if tilts { correction.reference_mm } else { workpiece(machine).into() };
     // without directions an offset is right at one place only: that of the workpiece
     let (terms, kept) = stated_at(machine, correction, reference_mm);
-    let last_work = machine.side(Side::Workpiece).filter(|a| a.name.is_rotary()).last().map(|a| a.name);
-    let mut out = Carried { terms: Vec::new(), zero: Vec::new(), reference_mm, not: Vec::new(), kept };
+    let last = |side: Side| machine.side(side).filter(|a| a.name.is_rotary()).last().map(|a| a.name);
+    let (last_work, last_tool) = (last(Side::Workpiece), last(Side::Tool));
+    let of_turns = Vec::new();
+    let mut out = Carried { terms: Vec::new(), zero: Vec::new(), reference_mm, not: Vec::new(), kept, of_turns };
     for term in terms {
         let own = turns_about_itself(machine, term.spot());
         if own && angles.contains(&term.axis) {
@@ -45,6 +59,9 @@ pub(super) fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -
                 term.axis, term.axis
             );
             out.not.push((term, why));
+        } else if own && Some(term.axis) == last_tool {
+            // it turns the tool and no line: the lines go through the ball as it stands
+            out.terms.push(term);
         } else if term.dof.is_angle() && !tilts {
             let why = if own {
                 format!(
@@ -57,6 +74,58 @@ pub(super) fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -
             out.not.push((term, why));
         } else {
             out.terms.push(term);
+        }
+    }
+    out.of_turns = turns_of_the_head(machine, correction, &out, tilts);
+    out
+}
+
+/// Where the control can hold no turn of an axis of the head, the lines and the ball stand elsewhere at zero all the same: offsets
+/// of the head that do the same at zero. A control counts the lines of its table from the ball as it stands.
+fn turns_of_the_head(machine: &Machine, correction: &Correction, carried: &Carried, tilts: bool) -> Vec<Term> {
+    let is_of_head = |t: &&Term| machine.axis(t.axis).is_some_and(|a| a.side == Side::Tool);
+    let mut turns: Vec<Term> = carried.not.iter().map(|(t, _)| t).filter(is_of_head).cloned().collect();
+    if !tilts {
+        let is_new = |t: &&Term| !correction.terms.iter().any(|known| known.spot() == t.spot());
+        turns.extend(correction.held_tilts.iter().filter(is_of_head).filter(is_new).cloned());
+    }
+    let head: Vec<&Axis> = machine.side(Side::Tool).filter(|a| a.name.is_rotary()).collect();
+    let ball = machine.tool.ball_at_zero(machine.tool.length_mm);
+    // what moves at zero: the line of each axis next to the ball, then the ball
+    let moved = |terms: &[Term]| {
+        let errors = Errors::from_terms(terms, carried.reference_mm);
+        let (mut frame, mut out) = (Transform::identity(), Vec::new());
+        for axis in &head {
+            let e = errors.of_axis(axis.name);
+            frame *= e.before.transform_about(&axis.point);
+            let along = axis.direction.into_inner();
+            let foot = axis.point + along * along.dot(&(ball - axis.point));
+            out.push(apply(&frame, &foot) - foot);
+            frame *= rotation_about(&axis.point, &axis.direction, e.zero_rad);
+            frame *= e.after.transform_about(&axis.point);
+        }
+        out.push(apply(&frame, &ball) - ball);
+        out
+    };
+    let with_turns: Vec<Term> = carried.terms.iter().chain(&turns).cloned().collect();
+    let by_turns = moved(&with_turns).into_iter().zip(moved(&carried.terms)).map(|(all, held)| all - held);
+    let places = head.iter().map(|a| (a.name, Place::Before)).chain(head.last().map(|a| (a.name, Place::After)));
+    // what such offsets hold already; touches of programs that give axis positions show the turns whole
+    let active = correction.active.as_ref().and_then(|a| a.tables.as_ref()).map_or(&[][..], |t| &t.of_turns);
+    let (mut from, mut out) = (Vector3::zeros(), Vec::new());
+    for ((axis, place), to) in places.zip(by_turns) {
+        let own = to - from;
+        from = to;
+        for dof in [Dof::Dx, Dof::Dy, Dof::Dz] {
+            let spot = Spot { axis, place, dof };
+            let before = active.iter().find(|t| t.spot() == spot).map_or(0.0, |t| t.value);
+            let now = rounded(own[dof.index()] + if correction.transformation { before } else { 0.0 });
+            if now != 0.0 || before != 0.0 {
+                let parameter = format!("E{}0{axis}", dof.iso_letter());
+                let mut term = blank(spot, &parameter, "turn of the head at the ball", rounded(now - before), None);
+                (term.value, term.active_before) = (now, before);
+                out.push(term);
+            }
         }
     }
     out

@@ -15,6 +15,17 @@ use std::collections::BTreeMap;
 /// A control's steps are larger than this, µm: less is rounding of numbers, not of tables.
 const NOTHING_UM: f64 = 1e-3;
 
+/// What a control leaves of constant errors, at the worst pose and place, µm.
+pub(super) struct Figures {
+    pub rounding_um: f64,
+    /// Of all that is known.
+    pub rest_um: f64,
+    /// More, with a tool 100 mm longer.
+    pub longer_tool_um: f64,
+    /// Of all that is known, without the new numbers.
+    pub without_um: f64,
+}
+
 /// What the figures are made from.
 pub(super) struct Pieces<'a> {
     pub machine: &'a Machine,
@@ -119,19 +130,24 @@ impl Pieces<'_> {
         out
     }
 
-    /// What rounding leaves; what everything of constant errors leaves; what a tool 100 mm longer adds. µm.
-    pub(super) fn figures(&self, exact: &Seen) -> (f64, f64, f64) {
-        let held = self.errors(&self.carried.terms);
+    /// `before`: the machine as the control sees it now; `exact`: as it is to see it, not rounded.
+    pub(super) fn figures(&self, before: &Seen, exact: &Seen) -> Figures {
+        let held = self.errors(&self.carried.in_lines());
         let none = BTreeMap::new();
         let rounding =
             self.worst(&self.filled.seen, held.clone(), 0.0, &none) - self.worst(exact, held.clone(), 0.0, &none);
         let mut all = self.carried.terms.clone();
         all.extend(self.carried.zero.iter().cloned());
         all.extend(self.carried.not.iter().map(|(t, _)| t.clone()));
-        let rest = self.worst(&self.filled.seen, self.errors(&all), 0.0, self.zero);
-        let longer = self.worst(exact, held.clone(), 100.0, &none) - self.worst(exact, held, 0.0, &none);
+        let all = self.errors(&all);
+        let rest = self.worst(&self.filled.seen, all.clone(), 0.0, self.zero);
         let clean = |um: f64| if um < NOTHING_UM { 0.0 } else { um };
-        (clean(rounding), clean(rest), clean(longer))
+        Figures {
+            rounding_um: clean(rounding),
+            rest_um: clean(rest),
+            longer_tool_um: clean(self.worst(&self.filled.seen, all.clone(), 100.0, self.zero) - rest),
+            without_um: self.worst(before, all, 0.0, &none),
+        }
     }
 }
 

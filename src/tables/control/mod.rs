@@ -32,6 +32,7 @@ use carried::{Carried, add_angles, carried, with_active};
 use changes::{Change, Division, SHEET};
 pub use files::digits;
 use fill::{Filled, Question, Value};
+use left::Figures;
 use nalgebra::Vector3;
 use replace::Replaced;
 use std::collections::{BTreeMap, BTreeSet};
@@ -92,6 +93,9 @@ pub struct Export {
     /// What each position table leaves.
     pub table_errors: Vec<TableError>,
 }
+
+/// More than this is no rounding, µm.
+const WORSE_UM: f64 = 1.0;
 
 /// A value that every backup of such a machine holds, for messages; position tables are not always written.
 #[must_use]
@@ -194,7 +198,8 @@ pub fn export(
     let carried = carried(machine, correction, kind);
     let length = machine.tool.length_mm;
     let seen = |terms: &[Term]| Seen::from_errors(machine, &Errors::from_terms(terms, carried.reference_mm), length);
-    let (before, now) = (seen(&with_active(&carried.terms)), seen(&carried.terms));
+    let in_lines = carried.in_lines();
+    let (before, now) = (seen(&with_active(&in_lines)), seen(&in_lines));
     let spellings = old::spellings(tables);
     if !carried.kept.is_empty() {
         findings.push(Finding::info("tables::kept", kept_in_words(&carried.kept)));
@@ -325,7 +330,6 @@ pub fn export(
             .help("`axiscal identify` says what these touches cannot determine"),
         );
     }
-    let ((), findings) = findings.finish(())?;
     let pieces = left::Pieces {
         machine,
         correction,
@@ -336,6 +340,20 @@ pub fn export(
         radius_mm: options.radius_mm,
     };
     let left = pieces.left();
+    let Figures { rounding_um, rest_um, longer_tool_um, without_um } = pieces.figures(&before, &now);
+    if rest_um > without_um + rounding_um + WORSE_UM {
+        let says = format!(
+            "what is known of the machine leaves up to {rest_um:.0} µm with these numbers, and {without_um:.0} µm without them"
+        );
+        findings.push(Finding::error("tables::worse", says).help(
+            "leave the control's values as they are: it has no place for a part of what was found (`left` of --json lists it), and \
+             the rest alone makes the machine worse",
+        ));
+    }
+    if options.force {
+        force(&mut findings.0, &mut noted);
+    }
+    let ((), findings) = findings.finish(())?;
     let written: BTreeMap<String, f64> = std::iter::once((spellings.first().copied(), &filled))
         .chain(others.iter().map(|(s, f)| (Some(*s), f)))
         .filter(|(_, f)| f.known())
@@ -345,7 +363,6 @@ pub fn export(
     // of several files with the same values one is loaded
     let main = tables.file.iter().filter(is_written).any(|f| !f.grids && !f.variant);
     let loaded = tables.file.iter().filter(is_written).filter(|f| !f.variant || !main);
-    let (rounding_um, rest_um, longer_tool_um) = pieces.figures(&now);
     let mut terms = carried.terms.clone();
     terms.extend(carried.zero.iter().cloned());
     terms.sort_by_key(Term::spot);
@@ -371,6 +388,7 @@ pub fn export(
             .collect(),
         values: written,
         changes: division.by_name(),
+        of_turns: carried.of_turns.clone(),
         zero_deg: zero,
         grids: grid_list,
         workpiece_shift_mm: shift.into(),

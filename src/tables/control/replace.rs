@@ -38,7 +38,10 @@ impl Replaced {
     ) -> Self {
         let seen =
             |terms: &[Term]| Seen::from_errors(machine, &Errors::from_terms(terms, carried.reference_mm), length_mm);
-        let found = || carried.terms.iter().filter(|t| correction.found.contains(&t.spot()));
+        let found = || {
+            let own = carried.terms.iter().filter(|t| correction.found.contains(&t.spot()));
+            own.chain(&carried.of_turns)
+        };
         let moved = |t: &Term| seen(&[Term { value: STEP, ..t.clone() }]);
         Self {
             described: seen(&[]),

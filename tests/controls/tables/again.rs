@@ -263,6 +263,29 @@ fn the_share_of_a_tilt_does_not_grow() {
     }
 }
 
+/// A turn of the head stands in offsets at the ball. Measured again under the transformation the turn is found again, and the
+/// table's axis as much further off as the ball was: nothing changes. The same with axis positions.
+#[test]
+fn the_share_of_a_turn_of_the_head_does_not_grow() {
+    let machine = machine("swivel-head");
+    let aside_mm = 202.684 * 0.01_f64.to_radians().sin();
+    let with = |ey0c: f64| vec![("location-b", "EA0B", 0.01), ("location-c", "EY0C", ey0c)];
+    for control in ["fanuc", "heidenhain"] {
+        let bare = during(&machine, control, &with(0.01), BARE, Old::default());
+        let tcp = During { loaded: None, transformation: true };
+        let first = during(&machine, control, &with(0.01), tcp, Old::default());
+        assert_eq!(values(&bare), values(&first), "{control}");
+        assert!(values(&first).iter().any(|(_, old, new)| (new - old - (0.01 - aside_mm)).abs() < 1.1e-3), "{control}");
+        for (transformation, ey0c) in [(true, aside_mm), (false, 0.01)] {
+            let loaded = During { loaded: Some(&first.compensation), transformation };
+            let second = during(&machine, control, &with(ey0c), loaded, Old::default());
+            for ((id, _, new), (_, _, again)) in values(&first).into_iter().zip(values(&second)) {
+                assert!((new - again).abs() < 1.1e-3, "{control} {id} {transformation}: {new}, measured again {again}");
+            }
+        }
+    }
+}
+
 /// The head alone is measured: where the table stands next to it nobody touched, and the builder's number stays, moved with the
 /// head. C lies at 0.060 and the ball 0.101 beside B: the control knows both to 1 um.
 #[test]

@@ -67,11 +67,11 @@ impl Said<'_> {
     }
 }
 
-/// What goes with the turns of a screw is too fine for the rows of a table over the whole travel: that export is refused, for
-/// this reason alone, and the forced one is looked at.
+/// What goes with the turns of a screw is too fine for the rows of a table over the whole travel, and a part of what a head has may be
+/// worse than nothing: that export is refused, for these reasons alone, and the forced one is looked at.
 fn too_coarse<T>(refused: Failure, forced: impl FnOnce() -> Result<T, Failure>) -> Result<T, Failure> {
     let mut errors = refused.0.iter().filter(|f| f.severity == Severity::Error);
-    if errors.all(|f| f.code == "tables::too_coarse") { forced() } else { Err(refused) }
+    if errors.all(|f| matches!(f.code, "tables::too_coarse" | "tables::worse")) { forced() } else { Err(refused) }
 }
 
 #[test]
