@@ -382,3 +382,34 @@ fn tables_of_compare_fit_every_width() {
         assert!(wide.is_none(), "{width}: {wide:?}");
     }
 }
+
+/// A pose at which the machine is 12 um off is not used, until the effect that explains it is asked with all touches in. The model's
+/// own figures stay those of `identify`; the sentence says what it is about.
+#[test]
+fn the_figures_of_the_model_are_the_same_in_every_answer() {
+    let own = "format = \"axiscal-effects/1\"\n[[effect]]\nid = \"one-pose\"\nname = \"One pose\"\nsays = \"s\"\nlook = \"l\"\nat = \"A\"\n\
+               terms = [ { parameter = \"op\", unit = \"um\", dof = \"dz\", formula = \"step(A - 1.3)\", typical = 10 } ]\n";
+    let wrong = "effects_file = \"own.toml\"\nseed = 8\n[effects.one-pose]\nop = 12.0\n[noise]\ntouch_um = 1.0\n";
+    let folder = folder(&["full"], wrong, Some(own));
+    let at = folder.path();
+    let study = std::fs::read_to_string(at.join("study.toml")).unwrap();
+    if !study.contains("effects_file") {
+        std::fs::write(at.join("study.toml"), format!("effects_file = [\"own.toml\"]\n{study}")).unwrap();
+    }
+    let (fit, _) = json(at, &["identify", "study.toml"]);
+    let (d, _) = json(at, &["diagnose", "study.toml"]);
+    let (c, _) = json(at, &["compare", "study.toml"]);
+    assert_eq!(d["candidates"][0]["effect"], "one-pose", "{}", d["says"]);
+    let rejected = fit["rejected"].as_array().unwrap().len();
+    assert!(rejected > 5 && d["all_touches"]["put_back"] == rejected, "{rejected} {}", d["all_touches"]);
+    assert!(d["all_touches"]["rms_um"].as_f64() > d["rms_um"].as_f64());
+    for figure in ["rms_um", "held_out_rms_um"] {
+        let of = |answer: &Value| answer[figure].as_f64().unwrap();
+        assert!((of(&fit) - of(&d)).abs() < 1e-9, "{figure}: {} {}", fit[figure], d[figure]);
+        if !c[figure].is_null() {
+            assert!((of(&fit) - of(&c)).abs() < 1e-9, "{figure}: {} {}", fit[figure], c[figure]);
+        }
+    }
+    let says = d["says"].as_str().unwrap();
+    assert!(says.contains(&format!("with the {rejected} that are not used now")), "{says}");
+}
