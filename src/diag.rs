@@ -204,8 +204,15 @@ pub fn shown(findings: &[Finding]) -> Vec<Finding> {
     }
     let rest = counts.into_iter().filter(|(_, count)| *count > SHOWN);
     out.extend(rest.map(|(code, count)| {
-        let message = format!("{} more findings of the kind {code} are not listed", count - SHOWN);
-        Finding::info("diag::more", message).help("correct the listed ones and run the command again")
+        let message = match count - SHOWN {
+            1 => format!("1 more finding of the kind {code} is not listed"),
+            more => format!("{more} more findings of the kind {code} are not listed"),
+        };
+        let more = Finding::info("diag::more", message);
+        match findings.iter().any(|f| f.code == code && f.severity == Severity::Error) {
+            true => more.help("correct the listed ones and run the command again"),
+            false => more,
+        }
     }));
     out
 }

@@ -366,7 +366,7 @@ fn open(steps: &[Step], found: &Diagnosis, outcome: &Outcome) -> Vec<String> {
     out.extend(outcome.undetermined.iter().map(|u| u.says.clone()));
     out.extend(outcome.weak.iter().map(|w| w.says.clone()));
     if !found.not_seen.is_empty() {
-        out.push(format!("no effect on these touches: {}", found.not_seen.join(", ")));
+        out.push(format!("cannot be seen with these touches: {}", found.not_seen.join(", ")));
     }
     out
 }

@@ -129,7 +129,8 @@ fn write(
             i + 1,
             plain(typical)
         );
-        let factor = if text.contains(' ') { format!("({text})") } else { text.clone() };
+        let is_sum = text.contains(" - ") || text.contains(" + ");
+        let factor = if is_sum { format!("({text})") } else { text.clone() };
         formula.push(format!("{size:+.2} {unit} * {factor} [{} {dof}]", place.at));
     }
     let mut toml = format!(

@@ -15,6 +15,9 @@ use std::sync::Arc;
 /// Highest order of a rotary axis that is looked for.
 pub const ORDERS: u32 = 12;
 
+/// Most lobes of a probe that are looked for.
+const LOBES: u32 = 8;
+
 /// Up to so many angles, no polynomial says more than waves do.
 const FEW_ANGLES: usize = 4;
 
@@ -390,6 +393,9 @@ impl Plan {
             Kind::Temperature => self.put(id(""), name, &[v], d, powers(2)),
             Kind::Approach if along_approach => {
                 self.put(id(""), name, &[v], d, (1..=4).flat_map(waves).collect());
+                // three seats of a stylus make six lobes, too
+                let orders = (5..=LOBES).map(|k| (f64::from(k), waves(k))).collect();
+                self.scan(id("-order"), name, &[v], Some(d), orders, 1);
             }
             Kind::Approach => {}
             Kind::Plain => self.put(id(""), name, &[v], d, powers(1)),

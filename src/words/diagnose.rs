@@ -323,8 +323,8 @@ fn tested(d: &Diagnosis) -> String {
     }
     let unseen = match d.not_seen.iter().filter(|id| !d.needs_temperature.contains(id)).count() {
         0 => String::new(),
-        1 => "; 1 more has no effect on these touches".to_owned(),
-        n => format!("; {n} more have no effect on these touches"),
+        1 => "; 1 more cannot be seen with these touches".to_owned(),
+        n => format!("; {n} more cannot be seen with these touches"),
     };
     format!(" {} effects were tested{unseen}.", d.tested)
 }

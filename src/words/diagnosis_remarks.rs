@@ -38,7 +38,10 @@ pub(crate) fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
     let unseen: Vec<&str> =
         d.not_seen.iter().filter(|id| !d.needs_temperature.contains(id)).map(String::as_str).collect();
     if !unseen.is_empty() {
-        out.push(format!("have no effect on these touches at any size: {}", unseen.join(", ")));
+        out.push(format!(
+            "cannot be seen with these touches (they move no touch, or the values of the model include all that they do): {}",
+            unseen.join(", ")
+        ));
     }
     let small: Vec<String> = d
         .power

@@ -390,12 +390,17 @@ fn the_figures_of_the_model_are_the_same_in_every_answer() {
     let own = "format = \"axiscal-effects/1\"\n[[effect]]\nid = \"one-pose\"\nname = \"One pose\"\nsays = \"s\"\nlook = \"l\"\nat = \"A\"\n\
                terms = [ { parameter = \"op\", unit = \"um\", dof = \"dz\", formula = \"step(A - 1.3)\", typical = 10 } ]\n";
     let wrong = "effects_file = \"own.toml\"\nseed = 8\n[effects.one-pose]\nop = 12.0\n[noise]\ntouch_um = 1.0\n";
-    let folder = folder(&["full"], wrong, Some(own));
+    let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
+    std::fs::write(at.join("own.toml"), own).unwrap();
+    std::fs::write(at.join("wrong.toml"), wrong).unwrap();
+    let machine = ["--machine", "trunnion", "--controller", "linuxcnc"];
+    ok(at, &[&["generate", "--program", "full", "--out", "."][..], &machine].concat());
+    let plan = ["--plan", "full.plan.json"];
+    ok(at, &[&["simulate", "--scenario", "wrong.toml", "--out", "full.log"][..], &machine, &plan].concat());
+    ok(at, &[&["new", "--log", "full.log", "--out", "study.toml"][..], &machine, &plan].concat());
     let study = std::fs::read_to_string(at.join("study.toml")).unwrap();
-    if !study.contains("effects_file") {
-        std::fs::write(at.join("study.toml"), format!("effects_file = [\"own.toml\"]\n{study}")).unwrap();
-    }
+    std::fs::write(at.join("study.toml"), format!("effects_file = [\"own.toml\"]\n{study}")).unwrap();
     let (fit, _) = json(at, &["identify", "study.toml"]);
     let (d, _) = json(at, &["diagnose", "study.toml"]);
     let (c, _) = json(at, &["compare", "study.toml"]);

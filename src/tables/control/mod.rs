@@ -289,7 +289,10 @@ pub fn export(
         Division::new(tables, (&filled, &others), &grid_list, active.and_then(|a| a.tables.as_ref()), &options.old);
     let unverified = say_unverified(tables, kind, &filled, (!grid_list.is_empty(), &division), options, &mut findings);
     let lacking = filled.lacking(&options.old, spellings.first().copied());
-    let instead = format!("no file with values is written, {SHEET} says by how much each value changes");
+    let instead = match division.changes().next() {
+        Some(_) => format!("no file with values is written, {SHEET} says by how much each value changes"),
+        None => "no file is written, because no value changes".to_owned(),
+    };
     if division.values_known || filled.values.is_empty() {
         // a table that lacks its own is said above
     } else if !options.old.values.is_empty() && !lacking.is_empty() {
