@@ -19,7 +19,7 @@ pub struct AllTouches {
 }
 
 /// The answer of `diagnose`.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct Diagnosis {
     /// `axiscal-diagnosis/1`
     pub format: &'static str,
@@ -181,7 +181,7 @@ pub struct Shape {
 }
 
 /// An effect that may be missing.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Candidate {
     /// Its id.
     pub effect: String,
@@ -315,7 +315,6 @@ pub struct Power {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::super::next_step::MachineCheck;
-    use super::super::unresolved_pairs::Open;
     use super::super::verdict::Unexplained;
     use super::*;
 
@@ -325,58 +324,26 @@ pub(crate) mod tests {
             name: effect.into(),
             p: p_adjusted,
             p_adjusted,
-            proposed: false,
             rms_after_um: 1.0,
             held_out_before_um: held_out,
             held_out_after_um: held_out,
-            held_out_se_um: None,
             nested: true,
-            moves_um: None,
-            moves_sigma_um: None,
-            parameters: Vec::new(),
-            not_told: Vec::new(),
             same_as: same_as.iter().map(|s| (*s).to_owned()).collect(),
-            together_with: None,
-            or_else: None,
-            tell_apart: String::new(),
-            never_parted: false,
-            says: String::new(),
-            look: String::new(),
             share: 0.9,
             times_usual: 1.0,
             plausible: true,
-            wrong_sign: Vec::new(),
-            weakens: Vec::new(),
-            remains: None,
+            ..Candidate::default()
         }
     }
+
     fn diagnosis(why: NotNamed, candidates: Vec<Candidate>) -> Diagnosis {
         Diagnosis {
-            format: FORMAT,
             verdict: Verdict::Unexplained(Unexplained { why, check: MachineCheck::NoFormula, sketchable: true }),
-            says: String::new(),
-            consequences: Vec::new(),
-            oversized: Vec::new(),
             rms_um: 5.0,
-            held_out_rms_um: None,
-            held_out_se_um: None,
-            all_touches: None,
             noise_um: 1.0,
-            visit_um: 0.0,
-            visit_source: VisitSource::Declared,
-            noise_says: String::new(),
-            lack_of_fit_p: 0.0,
-            depends: Vec::new(),
-            shape: None,
             candidates,
-            gross: Vec::new(),
-            outliers: Vec::new(),
             tested: 50,
-            power: Vec::new(),
-            not_seen: Vec::new(),
-            needs_temperature: Vec::new(),
-            open: Open::default(),
-            warnings: Vec::new(),
+            ..Diagnosis::default()
         }
     }
 

@@ -1,7 +1,6 @@
 //! A study of which no touch is used: there is nothing to search in, and nothing to be said but that.
 
 use super::answer::{Diagnosis, FORMAT};
-use super::unresolved_pairs::Open;
 use super::verdict::{TooLittle, Verdict};
 use super::{Options, Subject, decide, missed_touches, noise_um, setup_mistakes};
 
@@ -12,32 +11,16 @@ pub(super) fn used(subject: Subject, options: &Options) -> Diagnosis {
     let mut out = Diagnosis {
         format: FORMAT,
         verdict: Verdict::TooLittleData(TooLittle::NoneUsed { excluded: fit.data.observations.len() }),
-        says: String::new(),
-        consequences: Vec::new(),
-        oversized: Vec::new(),
         rms_um: fit.outcome.rms_um,
-        held_out_rms_um: None,
-        held_out_se_um: None,
-        all_touches: None,
         noise_um: noise_um(fit),
-        visit_um: 0.0,
         visit_source: fit.noise.visit_source,
         noise_says: fit.noise.says(),
         lack_of_fit_p: 1.0,
-        depends: Vec::new(),
-        shape: None,
-        candidates: Vec::new(),
         gross: match setup_mistakes::of_log(subject) {
             Some(supposed) => vec![supposed],
             None => planned.map(|p| missed_touches::hypotheses(subject, p)).unwrap_or_default(),
         },
-        outliers: Vec::new(),
-        tested: 0,
-        power: Vec::new(),
-        not_seen: Vec::new(),
-        needs_temperature: Vec::new(),
-        open: Open::default(),
-        warnings: Vec::new(),
+        ..Diagnosis::default()
     };
     decide::where_most_touches_are_unusable(&mut out, subject);
     out.says = crate::words::diagnose::verdict(&out, fit);

@@ -160,31 +160,16 @@ pub(super) fn candidate(subject: Subject, gross: &Gross) -> Option<Candidate> {
     Some(Candidate {
         effect: effect.id.clone(),
         name: gross.says.clone(),
-        p: 0.0,
-        p_adjusted: 0.0,
         proposed: true,
         rms_after_um: gross.rms_um,
-        held_out_before_um: None,
-        held_out_after_um: None,
-        held_out_se_um: None,
-        nested: false,
         parameters: vec![Parameter { name: gross.hypothesis.clone(), value: 1.0, unit: "1".into(), sigma: None }],
-        not_told: Vec::new(),
-        moves_um: None,
-        moves_sigma_um: None,
-        same_as: Vec::new(),
-        together_with: None,
-        or_else: None,
-        tell_apart: String::new(),
-        never_parted: false,
         says: effect.says.clone(),
         look: effect.look.clone(),
         share: 1.0 - (gross.rms_um / subject.fit.outcome.rms_um).powi(2),
         times_usual: 1.0,
         plausible: true,
-        wrong_sign: Vec::new(),
-        weakens: Vec::new(),
         remains: Some(gross.rms_um > GROSS_UM),
+        ..Candidate::default()
     })
 }
 

@@ -4,9 +4,10 @@ use super::next_step::MachineCheck;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
 /// Is something missing?
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub enum Verdict {
     /// Nothing is missing that these touches can show.
+    #[default]
     Adequate,
     /// An effect or a set-up mistake explains the residuals, and unused measurements confirm it.
     MissingEffect(Missing),

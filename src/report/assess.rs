@@ -86,7 +86,7 @@ fn one(a: &Assessment, paper: Paper, out: &mut String) {
     *out += &format!("{t}\n");
     let invisible: Vec<&Seen> = a.effects.iter().filter(|e| !e.visible).collect();
     if !invisible.is_empty() {
-        *out += "\nno effect on the touches at any size:\n";
+        *out += "\ncannot be seen at any size:\n";
         for e in invisible {
             *out += &format!("  {}: {}\n", e.effect, e.tell_apart);
         }

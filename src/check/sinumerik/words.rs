@@ -60,96 +60,17 @@ const RESERVED: [&str; 28] = [
 ];
 
 /// Words of the language that this grammar does not read: no name of a variable or label either.
-const OTHER_WORDS: [&str; 82] = [
-    "RET",
-    "PROC",
-    "EXTERN",
-    "CALL",
-    "ISOCALL",
-    "PCALL",
-    "FOR",
-    "TO",
-    "ENDFOR",
-    "CASE",
-    "OF",
-    "DEFAULT",
-    "GOTOC",
-    "GOTOS",
-    "REPEATB",
-    "ENDLABEL",
-    "ENDPROC",
-    "SBLON",
-    "SBLOF",
-    "SAVE",
-    "DISPLON",
-    "DISPLOF",
-    "VAR",
-    "BOOL",
-    "CHAR",
-    "AXIS",
-    "FRAME",
-    "AND",
-    "OR",
-    "XOR",
-    "NOT",
-    "DIV",
-    "MOD",
-    "TRUE",
-    "FALSE",
-    "AC",
-    "IC",
-    "DC",
-    "ACP",
-    "ACN",
-    "ABS",
-    "SQRT",
-    "ROUND",
-    "TRUNC",
-    "SIN",
-    "COS",
-    "TAN",
-    "MEAW",
-    "MEASA",
-    "MEAC",
-    "ATRANS",
-    "ROT",
-    "AROT",
-    "SCALE",
-    "MIRROR",
-    "STARTFIFO",
-    "STOPFIFO",
-    "REDEF",
-    "ADIS",
-    "AMIRROR",
-    "ASCALE",
-    "BRISK",
-    "CFC",
-    "CFIN",
-    "CFTCP",
-    "DRIVE",
-    "FFWOF",
-    "FFWON",
-    "FGROUP",
-    "FINEA",
-    "NORM",
-    "KONT",
-    "ORIMKS",
-    "ORIWKS",
-    "PTP",
-    "CP",
-    "SOFT",
-    "TRACYL",
-    "TRANSMIT",
-    "TRAANG",
-    "COARSEA",
-    "IPOENDA",
-];
+const OTHER_WORDS: &str = "RET PROC EXTERN CALL ISOCALL PCALL FOR TO ENDFOR CASE OF DEFAULT GOTOC GOTOS REPEATB ENDLABEL ENDPROC SBLON \
+    SBLOF SAVE DISPLON DISPLOF VAR BOOL CHAR AXIS FRAME AND OR XOR NOT DIV MOD TRUE FALSE AC IC DC ACP ACN ABS \
+    SQRT ROUND TRUNC SIN COS TAN MEAW MEASA MEAC ATRANS ROT AROT SCALE MIRROR STARTFIFO STOPFIFO REDEF ADIS \
+    AMIRROR ASCALE BRISK CFC CFIN CFTCP DRIVE FFWOF FFWON FGROUP FINEA NORM KONT ORIMKS ORIWKS PTP CP SOFT TRACYL \
+    TRANSMIT TRAANG COARSEA IPOENDA";
 
 /// Can a name not be one because it means something: an address with digits (`N70`, `M30`, `L10`, `R1`) or a word? The first
 /// two characters of a name are letters or `_`.
 pub fn means_something(name: &str) -> bool {
     let address = name.as_bytes().get(1).is_none_or(u8::is_ascii_digit);
-    address || RESERVED.contains(&name) || OTHER_WORDS.contains(&name)
+    address || RESERVED.contains(&name) || OTHER_WORDS.split(' ').any(|word| word == name)
 }
 
 /// Axis and way of an address; `None` where it is no axis.
