@@ -327,7 +327,7 @@
       lines.push(`These have no effect on these touches and cannot be determined; they stay at their start values: ${silent.map((u) => Object.keys(u.combination)[0]).join(', ')}.${takes}`);
     }
     for (const text of new Set([...lines, ...view.weak.map((w) => w.says)])) list.append(make('li', {}, text));
-    if (d.not_seen.length) list.append(make('li', {}, `This program cannot measure these effects: ${d.not_seen.map(effectName).join(', ')}.`));
+    if (d.not_seen.length) list.append(make('li', {}, `These effects cannot be seen with these touches (they move no touch, or the values of the model include all that they do): ${d.not_seen.map(effectName).join(', ')}.`));
     const seen = [...d.power].sort((a, b) => b.minimal_detectable_um - a.minimal_detectable_um).slice(0, 8);
     if (seen.length) list.append(make('li', {}, `Smallest size at which these effects would be found: ${seen.map((q) => `${effectName(q.effect)} ${digits(q.minimal_detectable_um, 2)} µm`).join(', ')}. All others of the ${d.tested} tried would have been found smaller.`));
     s.append(list.children.length ? list : make('p', {}, 'Every result of the model is determined.'));

@@ -112,7 +112,8 @@ impl Diagnosis {
             let none = || "most touches found nothing".to_owned();
             return Some(self.candidates.first().map(|c| c.name.clone()).or(named).unwrap_or_else(none));
         }
-        let right = |g: &&Gross| g.rms_um < super::setup_mistakes::RIGHT * self.rms_um;
+        let rms_um = self.all_touches.map_or(self.rms_um, |all| all.rms_um);
+        let right = |g: &&Gross| g.rms_um < super::setup_mistakes::RIGHT * rms_um;
         let elsewhere = |g: &&Gross| g.hypothesis == super::setup_mistakes::ELSEWHERE;
         let found = self.gross.first().filter(right).or_else(|| self.gross.iter().find(elsewhere));
         found.map(|g| g.says.clone())

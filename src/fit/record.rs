@@ -89,9 +89,9 @@ impl Fit {
         f(&touches)
     }
 
-    /// Calls `f` with the touches where an errorless machine makes them on artefacts in their places, as the columns of effects that the
-    /// model leaves out are made: a sphere that stands elsewhere is touched with other normals, and what cannot be told apart
-    /// would look as if it could. `f` gets the free unknowns, too.
+    /// Calls `f` with the touches of an errorless machine on artefacts at their planned places. The columns of effects that the model
+    /// leaves out are made there, too: a sphere beside its place is touched with other normals, and two effects that are one
+    /// number would seem to differ. `f` also gets the free unknowns.
     pub(super) fn with_nominal_touches<T>(&self, f: impl FnOnce(&Touches, &DVector<f64>) -> T) -> T {
         let mut theta = self.theta.clone();
         for (value, (start, unknown)) in theta.iter_mut().zip(self.model.start().into_iter().zip(&self.model.unknowns))

@@ -33,10 +33,10 @@ fn runs_backward(timed: &[(&Touch, f64)]) -> Option<(Finding, usize)> {
         n => format!("; this happens {n} more times"),
     };
     let message = format!(
-        "the times run backward: touch {} has time_s = {time_s}, touch {} before it {before_s}{more}",
+        "the times run backward: touch {} has {time_s} s, touch {} before it {before_s} s{more}",
         touch.id, before.id
     );
-    let help = "effects of time (drift, warm-up) use these times: correct them, or remove the column time_s";
+    let help = "effects of time (drift, warm-up) use these times: correct them, or leave them out of the log";
     Some((Finding::warning("log::time_backward", message).help(help), touch.line))
 }
 
@@ -62,7 +62,7 @@ fn other_unit(plan: &Plan, timed: &[(&Touch, f64)]) -> Option<Finding> {
         format!("the touches take {} s by their times, and {} s by the plan", rounded(log_s), rounded(plan_s));
     let unit = if is_longer { "milliseconds" } else { "minutes or hours" };
     let help = format!(
-        "time_s is in seconds: are these values in {unit}? effects of time (drift, warm-up) and the spindle use them"
+        "times are in seconds: are these values in {unit}? Effects of time (drift, warm-up) and the spindle use them"
     );
     Some(Finding::warning("log::time_unit", message).help(help))
 }
@@ -78,5 +78,5 @@ fn median(values: &mut [f64]) -> Option<f64> {
 
 /// Three digits are enough to see the unit.
 fn rounded(seconds: f64) -> String {
-    if seconds >= 100.0 { format!("{seconds:.0}") } else { format!("{seconds:.3}") }
+    crate::units::significant(seconds, 3)
 }

@@ -521,8 +521,7 @@ impl Check<'_> {
                 span,
                 "machine::letter",
                 format!(
-                    "axis {name} is more than 60 degrees off {}, about which an axis of this letter turns: its errors would get \
-                     the wrong names",
+                    "axis {name} is more than 60 degrees off {}. Its errors are named by its letter and would get wrong names",
                     ["X", "Y", "Z"][own]
                 ),
                 format!("correct the direction, or name the axis {} (ISO 841)", fits.join(" or ")),

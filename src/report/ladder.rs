@@ -9,6 +9,7 @@ use crate::compare::verify::Verification;
 use crate::fit::outcome::Outcome;
 use crate::study::history::History;
 use comfy_table::Cell;
+use std::collections::BTreeSet;
 
 fn or_dash(value: Option<f64>) -> String {
     value.map_or_else(|| "-".into(), significant)
@@ -90,11 +91,11 @@ pub fn change(
     }
     // less than a thousandth of a nanometre is the arithmetic's
     const NOTHING_UM: f64 = 1e-6;
-    // with more unknowns the same touches leave less: other touches were excluded
-    if after.unknowns > before.unknowns && after.rms_um > before.rms_um + NOTHING_UM {
+    let not_used = |o: &Outcome| o.rejected.iter().map(|r| (r.run, r.id)).collect::<BTreeSet<_>>();
+    let others = not_used(before) != not_used(after);
+    if others && after.unknowns > before.unknowns && after.rms_um > before.rms_um + NOTHING_UM {
         let line = format!(
-            "the residual rises, because the model with it excludes other touches: {} are not used before, {} after. Look at them \
-             before you keep this effect",
+            "the residual rises, because other touches are not used: {} before, {} after. Look at them before you keep this effect",
             before.rejected.len(),
             after.rejected.len()
         );

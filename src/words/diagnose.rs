@@ -392,7 +392,11 @@ fn depends_on(d: &Diagnosis) -> String {
     let Some(first) = d.depends.first() else { return String::new() };
     let mut out = first.says.clone();
     let of_touches = |w: &&Where| w.finding == Finding::Outliers;
-    let rival = d.depends[1..].iter().find(|w| !of_touches(w) && w.share > first.share - AS_MUCH);
+    // only these have shares of the same sum
+    let is_pattern = |w: &Where| matches!(w.finding, Finding::Pattern | Finding::Effect);
+    let as_much =
+        |w: &&Where| is_pattern(first) && is_pattern(w) && w.by != first.by && w.share > first.share - AS_MUCH;
+    let rival = d.depends[1..].iter().find(as_much);
     if let Some(rival) = rival {
         out += &format!(
             ". {} explains as much ({:.0} %)",

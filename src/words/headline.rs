@@ -167,10 +167,16 @@ fn falls(m: &Material, c: &Candidate) -> String {
     let sizes = if sizes.is_empty() { String::new() } else { format!(" Its size: {}.", sizes.join("; ")) };
     let moves = moves.map_or_else(String::new, |most| format!(" It moves single touches by up to {}.", um(most)));
     let rest = if c.remains == Some(true) { " Something else is missing as well." } else { "" };
+    let (of, now_um, then_um) = match &d.all_touches {
+        None => (String::new(), d.rms_um, m.proposed.map_or(c.rms_after_um, |fit| fit.outcome.rms_um)),
+        Some(all) => {
+            (format!(" of all touches, with the {} that are not used now,", all.put_back), all.rms_um, c.rms_after_um)
+        }
+    };
     format!(
-        "The residual is {}, and {} with this effect in the model; the probe noise is {}.{sizes}{moves}{rest}",
-        um(d.rms_um),
-        um(m.proposed.map_or(c.rms_after_um, |fit| fit.outcome.rms_um)),
+        "The residual{of} is {}, and {} with this effect in the model; the probe noise is {}.{sizes}{moves}{rest}",
+        um(now_um),
+        um(then_um),
         um(d.noise_um)
     )
 }

@@ -306,7 +306,8 @@ pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
             (Some(id), _) => more.push(id),
             (None, Some((make, then))) if asks_for_temperatures => {
                 touches = make(bench, &base, &mut same_draws).unwrap();
-                (result.gave_temperatures, expects) = (true, then);
+                // the second step has to name the cause
+                (result.led, result.gave_temperatures, expects) = (false, true, then);
             }
             _ => break,
         }

@@ -90,8 +90,8 @@ impl Check<'_> {
             return;
         }
         let message = format!("the directions of the linear axes of {machine:?} are {}", wrong.join(", and "));
-        let help = "R is right-handed with X Y Z along the linear axes; a direction is that of the tool over the workpiece \
-                    for a positive move: with another one the errors get wrong signs or letters";
+        let help = "correct the directions: each is the way of the tool over the workpiece for a positive move, and R is right-handed \
+                    with X, Y and Z along them";
         self.findings.push(Finding::warning("machine::not_along_r", message).help(help).at(self.source, here.clone()));
     }
 

@@ -29,6 +29,8 @@ pub(super) struct Carried {
     pub kept: Vec<Spot>,
     /// Offsets that stand for turns of the head which the control cannot hold.
     pub of_turns: Vec<Term>,
+    /// Turns of the head that the study holds: the machine has them too.
+    pub held_turns: Vec<Term>,
 }
 
 impl Carried {
@@ -47,8 +49,17 @@ pub(super) fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -
     let (terms, kept) = stated_at(machine, correction, reference_mm);
     let last = |side: Side| machine.side(side).filter(|a| a.name.is_rotary()).last().map(|a| a.name);
     let (last_work, last_tool) = (last(Side::Workpiece), last(Side::Tool));
-    let of_turns = Vec::new();
-    let mut out = Carried { terms: Vec::new(), zero: Vec::new(), reference_mm, not: Vec::new(), kept, of_turns };
+    let is_of_head = |t: &&Term| machine.axis(t.axis).is_some_and(|a| a.side == Side::Tool);
+    let is_new = |t: &&Term| !tilts && !correction.terms.iter().any(|known| known.spot() == t.spot());
+    let mut out = Carried {
+        terms: Vec::new(),
+        zero: Vec::new(),
+        reference_mm,
+        not: Vec::new(),
+        kept,
+        of_turns: Vec::new(),
+        held_turns: correction.held_tilts.iter().filter(is_of_head).filter(is_new).cloned().collect(),
+    };
     for term in terms {
         let own = turns_about_itself(machine, term.spot());
         if own && angles.contains(&term.axis) {
@@ -76,19 +87,16 @@ pub(super) fn carried(machine: &Machine, correction: &Correction, kind: &Kind) -
             out.terms.push(term);
         }
     }
-    out.of_turns = turns_of_the_head(machine, correction, &out, tilts);
+    out.of_turns = turns_of_the_head(machine, correction, &out);
     out
 }
 
-/// Where the control can hold no turn of an axis of the head, the lines and the ball stand elsewhere at zero all the same: offsets
-/// of the head that do the same at zero. A control counts the lines of its table from the ball as it stands.
-fn turns_of_the_head(machine: &Machine, correction: &Correction, carried: &Carried, tilts: bool) -> Vec<Term> {
+/// Turns of the head that the control cannot hold, as offsets that do the same to the lines and the ball at zero. A control counts
+/// the lines of its table from the ball as it stands.
+fn turns_of_the_head(machine: &Machine, correction: &Correction, carried: &Carried) -> Vec<Term> {
     let is_of_head = |t: &&Term| machine.axis(t.axis).is_some_and(|a| a.side == Side::Tool);
-    let mut turns: Vec<Term> = carried.not.iter().map(|(t, _)| t).filter(is_of_head).cloned().collect();
-    if !tilts {
-        let is_new = |t: &&Term| !correction.terms.iter().any(|known| known.spot() == t.spot());
-        turns.extend(correction.held_tilts.iter().filter(is_of_head).filter(is_new).cloned());
-    }
+    let not_held = carried.not.iter().map(|(t, _)| t).filter(is_of_head);
+    let turns: Vec<Term> = not_held.chain(&carried.held_turns).cloned().collect();
     let head: Vec<&Axis> = machine.side(Side::Tool).filter(|a| a.name.is_rotary()).collect();
     let ball = machine.tool.ball_at_zero(machine.tool.length_mm);
     // what moves at zero: the line of each axis next to the ball, then the ball
@@ -111,7 +119,7 @@ fn turns_of_the_head(machine: &Machine, correction: &Correction, carried: &Carri
     let by_turns = moved(&with_turns).into_iter().zip(moved(&carried.terms)).map(|(all, held)| all - held);
     let places = head.iter().map(|a| (a.name, Place::Before)).chain(head.last().map(|a| (a.name, Place::After)));
     // what such offsets hold already; touches of programs that give axis positions show the turns whole
-    let active = correction.active.as_ref().and_then(|a| a.tables.as_ref()).map_or(&[][..], |t| &t.of_turns);
+    let active = active_turns(correction);
     let (mut from, mut out) = (Vector3::zeros(), Vec::new());
     for ((axis, place), to) in places.zip(by_turns) {
         let own = to - from;
@@ -126,6 +134,25 @@ fn turns_of_the_head(machine: &Machine, correction: &Correction, carried: &Carri
                 (term.value, term.active_before) = (now, before);
                 out.push(term);
             }
+        }
+    }
+    out
+}
+
+/// The offsets of turns that the control holds already.
+fn active_turns(correction: &Correction) -> &[Term] {
+    correction.active.as_ref().and_then(|a| a.tables.as_ref()).map_or(&[], |t| &t.of_turns)
+}
+
+/// The correction with the places of the table's first rotary axis as the control counts them, from the ball: what stands in offsets
+/// of turns is no distance that a limit is for.
+pub(super) fn beside_the_ball(machine: &Machine, correction: &Correction) -> Correction {
+    let mut out = correction.clone();
+    let Some(first) = machine.side(Side::Workpiece).find(|a| a.name.is_rotary()) else { return out };
+    for turn in active_turns(correction).iter().filter(|_| correction.transformation) {
+        let spot = Spot { axis: first.name, place: Place::Before, dof: turn.dof };
+        for term in out.terms.iter_mut().filter(|t| t.spot() == spot) {
+            term.value -= turn.value;
         }
     }
     out

@@ -1,5 +1,6 @@
 //! What a table leaves: found by driving the machine with its errors by the control that knows the table.
 
+use super::carried::with_active;
 use super::{Carried, Filled, grids, workpiece};
 use crate::axes::{AxisName, Position};
 use crate::machine::{Machine, Side};
@@ -139,14 +140,20 @@ impl Pieces<'_> {
         let mut all = self.carried.terms.clone();
         all.extend(self.carried.zero.iter().cloned());
         all.extend(self.carried.not.iter().map(|(t, _)| t.clone()));
+        all.extend(self.carried.held_turns.iter().cloned());
+        if self.correction.transformation {
+            // the touches show what is off beside what the control held, turns of the head included
+            all.extend(with_active(&self.carried.of_turns));
+        }
         let all = self.errors(&all);
+        let zero_before = self.correction.active.as_ref().and_then(|a| a.tables.as_ref()).map(|t| &t.zero_deg);
         let rest = self.worst(&self.filled.seen, all.clone(), 0.0, self.zero);
         let clean = |um: f64| if um < NOTHING_UM { 0.0 } else { um };
         Figures {
             rounding_um: clean(rounding),
             rest_um: clean(rest),
             longer_tool_um: clean(self.worst(&self.filled.seen, all.clone(), 100.0, self.zero) - rest),
-            without_um: self.worst(before, all, 0.0, &none),
+            without_um: self.worst(before, all, 0.0, zero_before.unwrap_or(&none)),
         }
     }
 }

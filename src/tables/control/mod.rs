@@ -184,8 +184,8 @@ pub fn export(
 ) -> Result<(Export, Findings)> {
     let mut findings = Findings::default();
     let kind = kind_of(machine, tables)?;
-    findings.0.extend(correction.beyond(&options.limits));
     let active = correction.active.as_ref();
+    findings.0.extend(carried::beside_the_ball(machine, correction).beyond(&options.limits));
     if let Some(active) = active {
         match active.check_belongs(machine, controller) {
             Ok(more) => findings.0.extend(more.0),
@@ -324,7 +324,7 @@ pub fn export(
             format!("give the control's own backup with --backup FILE; where the table is not in use, --old \"{name}=0\" is enough"),
         ));
     }
-    if carried.terms.is_empty() && carried.zero.is_empty() && grid_list.is_empty() {
+    if in_lines.is_empty() && carried.zero.is_empty() && grid_list.is_empty() {
         findings.push(
             Finding::warning(
                 "tables::nothing",
@@ -345,16 +345,13 @@ pub fn export(
     let left = pieces.left();
     let Figures { rounding_um, rest_um, longer_tool_um, without_um } = pieces.figures(&before, &now);
     if rest_um > without_um + rounding_um + WORSE_UM {
-        let says = format!(
-            "what is known of the machine leaves up to {rest_um:.0} µm with these numbers, and {without_um:.0} µm without them"
-        );
-        findings.push(Finding::error("tables::worse", says).help(
-            "leave the control's values as they are: it has no place for a part of what was found (`left` of --json lists it), and \
-             the rest alone makes the machine worse",
-        ));
-    }
-    if options.force {
-        force(&mut findings.0, &mut noted);
+        let says = format!("the new values leave up to {rest_um:.0} µm, the present ones {without_um:.0} µm");
+        let help = "do not load them: the control has no place for a part of what was found, and the other part alone is worse";
+        let mut worse = [Finding::error("tables::worse", says).help(help)];
+        if options.force {
+            force(&mut worse, &mut noted);
+        }
+        findings.0.extend(worse);
     }
     let ((), findings) = findings.finish(())?;
     let written: BTreeMap<String, f64> = std::iter::once((spellings.first().copied(), &filled))

@@ -282,8 +282,39 @@ fn the_share_of_a_turn_of_the_head_does_not_grow() {
             for ((id, _, new), (_, _, again)) in values(&first).into_iter().zip(values(&second)) {
                 assert!((new - again).abs() < 1.1e-3, "{control} {id} {transformation}: {new}, measured again {again}");
             }
+            let (rest, again) = (first.rest_um, second.rest_um);
+            assert!((rest - again).abs() < 1.0, "{control} {transformation}: {rest} um, measured again {again} um");
         }
     }
+}
+
+/// A turn of the head that the study holds is one of the machine's, too.
+#[test]
+fn a_turn_of_the_head_that_is_held_counts_as_one_that_is_found() {
+    let machine = machine("swivel-head");
+    let planted = vec![("location-b", "EA0B", 0.01), ("location-c", "EY0C", 0.01)];
+    for control in ["fanuc", "heidenhain"] {
+        let [found, held] = [&[][..], &["EA0B"]].map(|held| {
+            let known = found_with_held(&machine, &planted, held, BARE);
+            control::export(&machine, control, &tables(control), &known, &accepting()).unwrap().0
+        });
+        assert_eq!(values(&found), values(&held), "{control}");
+        assert!((found.rest_um - held.rest_um).abs() < 1e-6, "{control}: {} {}", found.rest_um, held.rest_um);
+    }
+}
+
+/// What is forced is still asked whether it is verified.
+#[test]
+fn force_does_not_accept_what_is_not_verified() {
+    let machine = machine("swivel-head");
+    let known = found_during(&machine, &errors_of_the_head(), BARE);
+    let options = Options { force: true, ..Options::default() };
+    let refused = control::export(&machine, "fanuc", &tables("fanuc"), &known, &options).unwrap_err();
+    assert!(refused.0.iter().any(|f| f.code == "tables::unverified"), "{refused}");
+}
+
+fn errors_of_the_head() -> Planted<'static> {
+    vec![("location-b", "EA0B", 0.01), ("location-c", "EY0C", 0.01)]
 }
 
 /// The head alone is measured: where the table stands next to it nobody touched, and the builder's number stays, moved with the
