@@ -192,8 +192,8 @@ fn folder_of(path: &Path) -> &Path {
 
 fn unwritable(path: &Path, e: &std::io::Error) -> Failure {
     // `tempfile` puts the name of the temporary file beside the reason; the user has not asked for that name
-    let reason = e.to_string();
-    let reason = reason.split(" at path ").next().unwrap_or(&reason);
+    let is_wrapped = e.get_ref().is_some() && e.kind() != ErrorKind::Other;
+    let reason = if is_wrapped { e.kind().to_string() } else { e.to_string() };
     Failure::new("file::unwritable", format!("cannot write {}: {reason}", path.display())).help(remedy(e.kind()))
 }
 
