@@ -155,7 +155,10 @@ fn times_that_run_backward_or_are_no_seconds_are_warned_of() {
     }
     let (codes, says) = with(&|t| if t == 27.0 { 5.0 } else { t });
     assert_eq!(codes, ["log::time_backward"]);
-    assert!(says[0].starts_with("t.csv:7:1: ") && says[0].contains("touch 6 has time_s = 5"), "{says:?}");
+    assert!(
+        says[0].starts_with("t.csv:7:1: ") && says[0].contains("touch 6 has 5 s, touch 5 before it 23 s"),
+        "{says:?}"
+    );
     let (codes, says) = with(&|t| 5000.0 - t);
     assert_eq!(codes, ["log::time_backward"]);
     assert!(says[0].contains("this happens 18 more times"), "{says:?}");
