@@ -129,9 +129,7 @@ fn write(
             i + 1,
             plain(typical)
         );
-        let is_sum = text.contains(" - ") || text.contains(" + ");
-        let factor = if is_sum { format!("({text})") } else { text.clone() };
-        formula.push(format!("{size:+.2} {unit} * {factor} [{} {dof}]", place.at));
+        formula.push(format!("{size:+.2} {unit} * ({text}) [{} {dof}]", place.at));
     }
     let mut toml = format!(
         "[[effect]]\nid = \"{id}\"                # give it a name of your own\nname = \"Sketch: {}\"\nsays = \"{}\"\nlook = \"{}\"\n{}at = \"{}\"\nterms = [\n{terms}]\n",

@@ -9,4 +9,5 @@ pub(crate) mod headline;
 pub(crate) mod log;
 pub(crate) mod next_calls;
 pub(crate) mod next_steps;
+mod not_explained;
 pub(crate) mod why;

@@ -88,10 +88,17 @@ pub fn described(machine: &Machine, control: &str, found: &Correction, options: 
     Options { old, ..options.clone() }
 }
 
-/// What is said of an export is true of one that was forced, too: some of these mixtures would be refused.
+/// One that is refused because a control without directions would make the machine worse is forced: what is said of it is true all
+/// the same. No other refusal passes.
 pub fn export(machine: &Machine, control: &str, planted: &Planted, options: &Options) -> Export {
     let found = correction(machine, planted, None);
-    let options = &Options { force: true, ..options.clone() };
+    let mut options = options.clone();
+    if let Err(refused) = control::export(machine, control, &tables(control), &found, &options) {
+        let mut errors = refused.0.iter().filter(|f| f.severity == axiscal::diag::Severity::Error);
+        assert!(control != "sinumerik" && errors.all(|f| f.code == "tables::worse"), "{control}: {refused}");
+        options.force = true;
+    }
+    let options = &options;
     let options = described(machine, control, &found, options);
     control::export(machine, control, &tables(control), &found, &options).unwrap().0
 }
