@@ -37,7 +37,7 @@ mod visit_scatter;
 
 use crate::design::Planned;
 use crate::diag::Result;
-use crate::fit::{Fit, Reason, Settings, VisitSource, declared_tau_mm, identify_data};
+use crate::fit::{Fit, Reason, Settings, VisitSource, declared_tau_mm, identify_beside, identify_data};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::search::dependence::{Dependence, dependences};
@@ -208,88 +208,131 @@ fn scatter(fit: &Fit, machine: &Machine, evidence: &Evidence) -> Option<(f64, f6
 /// # Errors
 /// When a refit is impossible.
 pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
-    let Subject { machine, catalogue, fit, .. } = subject;
-    if fit.n_used() == 0 {
+    if subject.fit.n_used() == 0 {
         return Ok(no_usable_touches::used(subject, options));
     }
-    let features = Arc::new(features::features(fit, machine));
-    let Regression { evidence, named, ordered } = Regression::new(fit, machine, catalogue, &features);
-    let generics = features::shapes(&evidence, &features);
-    let mut seen = examine(fit, &evidence, &named, ordered.as_ref(), &features, &generics, options.at_most);
-    let weighed = match seen.groups.first().filter(|_| seen.search.leader().is_some()) {
-        Some(group) => effects_versus_patterns::weigh(evidence.question(), &named.library, &generics, group.first()),
-        None => effects_versus_patterns::Weighed::default(),
-    };
-    let mut beside = decide::OtherEvidence {
-        shapes_win: weighed.shapes_win,
-        // a shape that goes with the first by probability says nothing against the one that is borne out behind it
-        better: weighed.better.filter(|_| !seen.given).map(|shape| generics.shapes[shape].depends_on.clone()),
-        gathered: clustered_rejections::gathered(fit, &features),
-        scatter: scatter(fit, machine, &evidence),
-    };
-    if beside.gathered.is_some()
-        && let Some(mut answer) = with_all_touches(subject, options)?
+    let features = Arc::new(features::features(subject.fit, subject.machine));
+    // a second question, with all touches
+    if !subject.settings.all_in
+        && clustered_rejections::gathered(subject.fit, &features).is_some()
+        && let Some(answer) = with_all_touches(subject, options)?
     {
-        // the model's own figures are those of the touches that it uses, as in every other answer
-        let own = seen.folds.model();
-        (answer.held_out_rms_um, answer.held_out_se_um) =
-            (own.map(|h| h.rms_um), own.and_then(|h| h.standard_error_um));
         return Ok(answer);
     }
-    let mut decision = decide::decide(&seen, &beside);
-    if let Some(pair) = pairs::both(subject, &seen, &decision, &generics) {
-        pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most);
-        (seen.both, seen.given) = (Some(pair), true);
-        (beside.shapes_win, beside.better) = (false, None);
-        decision = decide::Decision { kind: decide::Kind::MissingEffect, confirmed: true, named: true };
-    }
-    let refitted = match options.refit && decision.confirmed && fit.outcome.rms_um <= setup_mistakes::GROSS_UM {
-        true => Some(with_effects(subject, &seen.first_names())?),
-        false => None,
-    };
-    if refitted.as_ref().is_some_and(|again| raises_the_error(fit, again)) {
-        // a name with which the error grows is none
-        (decision.kind, decision.confirmed) = (decide::Kind::Unexplained, false);
-    }
-    let mut gross =
-        if fit.outcome.rms_um > setup_mistakes::GROSS_UM { setup_mistakes::hypotheses(subject) } else { Vec::new() };
-    if let Some(supposed) = setup_mistakes::of_log(subject) {
-        gross.retain(|g| g.hypothesis != supposed.hypothesis);
-        gross.insert(0, supposed);
-    } else if let Some(planned) = options.planned.filter(|_| fit.data.mostly_missed()) {
-        let missed = missed_touches::hypotheses(subject, planned);
-        gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
-        gross.splice(0..0, missed);
-    }
-    // what the refit still misses is used where the first candidate is proposed, and can be found meanwhile
-    let (mut out, remains) = rayon::join(
-        || assemble_diagnosis::put_together(subject, &seen, &features, (decision, &beside), gross, options),
-        || refitted.as_ref().map(|again| still_fails(again, machine, catalogue)),
-    );
-    if out.mistake().is_none() {
-        let gathered = beside.gathered.is_some();
-        out.consequences = consequence::consequences(subject, &seen, &generics, (&out.verdict, gathered))?;
-    }
-    if options.refit
-        && let Some(first) = out.candidates.first_mut()
-        && (first.proposed || fit.rejected.values().any(Reason::is_outlier))
-        && fit.outcome.rms_um <= setup_mistakes::GROSS_UM
-    {
-        let again = match refitted {
-            Some(again) if first.proposed => again,
-            _ => with_effects(subject, &[first.effect.as_str()])?,
+    let found = Regression::new(subject.fit, subject.machine, subject.catalogue, &features);
+    Tested::new(subject, &found, &features, options)?.answer()
+}
+
+/// A fit with all tests made, and refitted with what they name.
+struct Tested<'a> {
+    subject: Subject<'a>,
+    features: &'a Arc<Features>,
+    options: &'a Options<'a>,
+    generics: Generics,
+    seen: Examination<'a>,
+    beside: decide::OtherEvidence,
+    decision: decide::Decision,
+    refitted: Option<Fit>,
+}
+
+impl<'a> Tested<'a> {
+    fn new(
+        subject: Subject<'a>,
+        found: &'a Regression<'a>,
+        features: &'a Arc<Features>,
+        options: &'a Options<'a>,
+    ) -> Result<Self> {
+        let Subject { machine, fit, .. } = subject;
+        let Regression { evidence, named, ordered } = found;
+        let generics = features::shapes(evidence, features);
+        let mut seen = examine(fit, evidence, named, ordered.as_ref(), features, &generics, options.at_most);
+        let weighed = match seen.groups.first().filter(|_| seen.search.leader().is_some()) {
+            Some(group) => {
+                effects_versus_patterns::weigh(evidence.question(), &named.library, &generics, group.first())
+            }
+            None => effects_versus_patterns::Weighed::default(),
         };
-        if first.proposed {
-            first.rms_after_um = again.outcome.rms_um;
-            first.remains = remains.or_else(|| Some(still_fails(&again, machine, catalogue)));
+        let mut beside = decide::OtherEvidence {
+            shapes_win: weighed.shapes_win,
+            // a shape that goes with the first by probability says nothing against the one that is borne out behind it
+            better: weighed.better.filter(|_| !seen.given).map(|shape| generics.shapes[shape].depends_on.clone()),
+            gathered: clustered_rejections::gathered(fit, features),
+            scatter: scatter(fit, machine, evidence),
+        };
+        let mut decision = decide::decide(&seen, &beside);
+        if let Some(pair) = pairs::both(subject, &seen, &decision, &generics) {
+            pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most);
+            (seen.both, seen.given) = (Some(pair), true);
+            (beside.shapes_win, beside.better) = (false, None);
+            decision = decide::Decision { kind: decide::Kind::MissingEffect, confirmed: true, named: true };
         }
-        assemble_diagnosis::outliers_again(&mut out, fit, &again);
+        let refitted = match options.refit && decision.confirmed && fit.outcome.rms_um <= setup_mistakes::GROSS_UM {
+            true => Some(with_effects(subject, &seen.first_names())?),
+            false => None,
+        };
+        if refitted.as_ref().is_some_and(|again| raises_the_error(fit, again)) {
+            // a name with which the error grows is none
+            (decision.kind, decision.confirmed) = (decide::Kind::Unexplained, false);
+        }
+        Ok(Self { subject, features, options, generics, seen, beside, decision, refitted })
     }
-    decide::where_most_touches_are_unusable(&mut out, subject);
-    not_identifiable::where_nothing_is_determined(&mut out, subject);
-    out.oversized = oversized::oversized(fit, machine, catalogue);
-    out.says = crate::words::diagnose::verdict(&out, fit);
-    Ok(out)
+
+    /// May what is named first bring the error down to the noise? Unknown where nothing was refitted on purpose.
+    fn may_explain(&self) -> bool {
+        if !self.options.refit || self.subject.fit.outcome.rms_um > setup_mistakes::GROSS_UM {
+            return true;
+        }
+        let again = self.refitted.as_ref().filter(|_| self.decision.confirmed);
+        again.is_some_and(|again| explains(self.subject.fit, again.outcome.rms_um))
+    }
+
+    /// The answer in words and figures.
+    fn answer(self) -> Result<Diagnosis> {
+        let Self { subject, features, options, generics, seen, beside, decision, refitted } = self;
+        let Subject { machine, catalogue, fit, .. } = subject;
+        let mut gross = if fit.outcome.rms_um > setup_mistakes::GROSS_UM {
+            setup_mistakes::hypotheses(subject)
+        } else {
+            Vec::new()
+        };
+        if let Some(supposed) = setup_mistakes::of_log(subject) {
+            gross.retain(|g| g.hypothesis != supposed.hypothesis);
+            gross.insert(0, supposed);
+        } else if let Some(planned) = options.planned.filter(|_| fit.data.mostly_missed()) {
+            let missed = missed_touches::hypotheses(subject, planned);
+            gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
+            gross.splice(0..0, missed);
+        }
+        // what the refit still misses is used where the first candidate is proposed, and can be found meanwhile
+        let (mut out, remains) = rayon::join(
+            || assemble_diagnosis::put_together(subject, &seen, features, (decision, &beside), gross, options),
+            || refitted.as_ref().map(|again| still_fails(again, machine, catalogue)),
+        );
+        if out.mistake().is_none() {
+            let gathered = beside.gathered.is_some();
+            out.consequences = consequence::consequences(subject, &seen, &generics, (&out.verdict, gathered))?;
+        }
+        if options.refit
+            && let Some(first) = out.candidates.first_mut()
+            && (first.proposed || fit.rejected.values().any(Reason::is_outlier))
+            && fit.outcome.rms_um <= setup_mistakes::GROSS_UM
+        {
+            let again = match refitted {
+                Some(again) if first.proposed => again,
+                _ => with_effects(subject, &[first.effect.as_str()])?,
+            };
+            if first.proposed {
+                first.rms_after_um = again.outcome.rms_um;
+                first.remains = remains.or_else(|| Some(still_fails(&again, machine, catalogue)));
+            }
+            assemble_diagnosis::outliers_again(&mut out, fit, &again);
+        }
+        decide::where_most_touches_are_unusable(&mut out, subject);
+        not_identifiable::where_nothing_is_determined(&mut out, subject);
+        out.oversized = oversized::oversized(fit, machine, catalogue);
+        out.says = crate::words::diagnose::verdict(&out, fit);
+        Ok(out)
+    }
 }
 
 /// Does the error of the touches that a fit uses grow with the effects that another one has besides?
@@ -303,16 +346,18 @@ fn raises_the_error(before: &Fit, after: &Fit) -> bool {
 /// The answer with all touches in, where touches that were not used lie together and one effect explains them as well: the only
 /// index position at another feed is no heap of bad touches.
 fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagnosis>> {
-    /// The error comes down to so many times the noise.
-    const EXPLAINS: f64 = 1.25;
-    if subject.settings.all_in {
+    let Subject { machine, catalogue, .. } = subject;
+    let settings = Settings { all_in: true, ..subject.settings.clone() };
+    let fit = identify_data(machine, catalogue, subject.fit.data.clone(), &settings)?;
+    let features = Arc::new(features::features(&fit, machine));
+    let found = Regression::new(&fit, machine, catalogue, &features);
+    let tested = Tested::new(Subject { settings: &settings, fit: &fit, ..subject }, &found, &features, options)?;
+    // most of the answer is worked out only where it can be one
+    if !tested.may_explain() {
         return Ok(None);
     }
-    let settings = Settings { all_in: true, ..subject.settings.clone() };
-    let fit = identify_data(subject.machine, subject.catalogue, subject.fit.data.clone(), &settings)?;
-    let mut answer = diagnose(Subject { settings: &settings, fit: &fit, ..subject }, options)?;
-    let explains = |c: &answer::Candidate| c.proposed && c.rms_after_um <= EXPLAINS * answer.noise_um;
-    if !answer.candidates.first().is_some_and(explains) {
+    let mut answer = tested.answer()?;
+    if !answer.candidates.first().is_some_and(|c| c.proposed && explains(&fit, c.rms_after_um)) {
         return Ok(None);
     }
     answer.outliers = assemble_diagnosis::outliers(subject.fit);
@@ -322,9 +367,23 @@ fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagno
         rms_um: answer.rms_um,
         held_out_rms_um: answer.held_out_rms_um,
     });
+    // the model's own figures are those of the touches that it uses, as in every other answer
+    let features = Arc::new(features::features(subject.fit, machine));
+    let own = Regression::new(subject.fit, machine, catalogue, &features);
+    let own = folds::Folds::new(subject.fit, &own.evidence);
+    let held_out = own.model();
     answer.rms_um = subject.fit.outcome.rms_um;
+    answer.held_out_rms_um = held_out.map(|h| h.rms_um);
+    answer.held_out_se_um = held_out.and_then(|h| h.standard_error_um);
     answer.says = crate::words::diagnose::verdict(&answer, &fit);
     Ok(Some(answer))
+}
+
+/// Does an error that is left come down to the noise of a fit?
+fn explains(fit: &Fit, rms_um: f64) -> bool {
+    /// To so many times the noise.
+    const TIMES: f64 = 1.25;
+    rms_um <= TIMES * noise_um(fit)
 }
 
 /// The fit with further effects.
@@ -336,7 +395,7 @@ pub fn with_effects(subject: Subject, more: &[&str]) -> Result<Fit> {
     settings.effects.extend(more.iter().map(|e| (*e).to_owned()));
     settings.reference = Some(subject.fit.model.reference);
     settings.quick = true;
-    identify_data(subject.machine, subject.catalogue, subject.fit.data.clone(), &settings)
+    identify_beside(subject.fit, subject.machine, subject.catalogue, &settings)
 }
 
 /// Does a fit still miss something, by the tests of the first step?

@@ -115,7 +115,7 @@ fn within_range(mut fit: Fit, job: Job, search: &mut ShapeSearch, starts: &Start
 
 /// Values of all unknowns by name, to begin at. Where a shape leaves no trace the sizes of its effect begin at none again: beside what
 /// noise made of them the shape would run anywhere.
-fn values(fit: &Fit) -> Starts {
+pub(super) fn values(fit: &Fit) -> Starts {
     /// A share of a combination that is rounding.
     const NONE: f64 = 1e-6;
     let unknowns = &fit.model.unknowns;

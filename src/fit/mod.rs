@@ -42,7 +42,7 @@ pub use rank::{design_jacobian, free_in_a_design, held_first, jumps_in_a_design,
 pub use record::{Fit, Linear};
 pub use remark::{Contradiction, Found, NoiseSource, Reason, Remark, VisitSource};
 pub use settings::{Knowledge, Mask, Settings};
-pub use start_values::identify_data;
+pub use start_values::{identify_beside, identify_data};
 
 use crate::diag::{Failure, Result};
 use crate::machine::Machine;

@@ -4,10 +4,10 @@
 //! with shapes is looked for beside a fit without it ([`start_shapes`]): first the one that shows most, then each of the rest beside
 //! it.
 
-use super::local_minima::lowest_minimum;
+use super::local_minima::{lowest_minimum, values};
 use super::nonlinear_scan::{self, Start, start_shapes};
 use super::shape_search::{Job, ShapeSearch, Starts};
-use super::{Fit, Settings, effects_of};
+use super::{Fit, Knowledge, Settings, effects_of};
 use crate::diag::Result;
 use crate::machine::Machine;
 use crate::model::catalogue::{Catalogue, Effect};
@@ -19,10 +19,36 @@ use std::collections::BTreeMap;
 /// # Errors
 /// As [`identify`](super::identify).
 pub fn identify_data(machine: &Machine, catalogue: &Catalogue, data: Data, settings: &Settings) -> Result<Fit> {
+    identify_from_starts(machine, catalogue, data, settings, Starts::new())
+}
+
+/// Fits a model with more effects than an earlier fit to the same touches. Shapes of the earlier one begin where they were, and those
+/// that it holds stay there: it is a trial, and a shape at an end of its range would run out again.
+///
+/// # Errors
+/// As [`identify`](super::identify).
+pub fn identify_beside(earlier: &Fit, machine: &Machine, catalogue: &Catalogue, settings: &Settings) -> Result<Fit> {
+    let mut settings = settings.clone();
+    for (u, known) in earlier.model.unknowns.iter().zip(&earlier.knowledge).filter(|(u, _)| u.shape) {
+        if let Some(held @ Knowledge::Fixed(_)) = known {
+            settings.knowledge.insert(u.name.clone(), *held);
+        }
+    }
+    identify_from_starts(machine, catalogue, earlier.data.clone(), &settings, values(earlier))
+}
+
+/// Effects with shapes of which a start is known are not looked for.
+fn identify_from_starts(
+    machine: &Machine,
+    catalogue: &Catalogue,
+    data: Data,
+    settings: &Settings,
+    mut starts: Starts,
+) -> Result<Fit> {
     let effects = effects_of(&settings.effects, catalogue, machine)?;
     let job = Job { machine, catalogue, effects: &effects };
-    let mut starts = Starts::new();
-    let mut waiting: Vec<&Effect> = effects.iter().copied().filter(|e| has_shapes(e)).collect();
+    let is_known = |e: &Effect| e.parameters.iter().any(|p| starts.keys().any(|name| own_name(name) == p.name));
+    let mut waiting: Vec<&Effect> = effects.iter().copied().filter(|e| has_shapes(e) && !is_known(e)).collect();
     let tau_mm = look_for(job, &data, settings, &mut waiting, &mut starts)?;
     let fit = identify_started(job, data, settings, &starts)?;
     // what an effect changes from one index position to the next is scatter to a fit without it, which then hardly shows it: where
@@ -59,6 +85,11 @@ fn look_for(
     Ok(0.0)
 }
 
+/// The name of a parameter without its block.
+fn own_name(name: &str) -> &str {
+    name.split('@').next().unwrap_or_default()
+}
+
 fn has_shapes(effect: &Effect) -> bool {
     effect.parameters.iter().any(|p| p.shape.is_some())
 }
@@ -66,9 +97,8 @@ fn has_shapes(effect: &Effect) -> bool {
 /// A trial fit of everything but some effects.
 fn fit_without(job: Job, data: &Data, settings: &Settings, out: &[&Effect], starts: &Starts) -> Result<Fit> {
     let is_out = |id: &str| out.iter().any(|e| e.id == id);
-    let own = |name: &str| name.split('@').next().unwrap_or_default().to_owned();
     let is_of_them =
-        |name: &str| out.iter().flat_map(|e| &e.parameters).any(|p| crate::symbols::same(&p.name, &own(name)));
+        |name: &str| out.iter().flat_map(|e| &e.parameters).any(|p| crate::symbols::same(&p.name, own_name(name)));
     let mut base = Settings { quick: true, type_b: BTreeMap::new(), ..settings.clone() };
     base.effects.retain(|id| !is_out(id));
     base.knowledge.retain(|name, _| !is_of_them(name));
