@@ -2,6 +2,7 @@
 'use strict';
 (() => {
   const view = JSON.parse(document.getElementById('view').textContent);
+  const charts = Object.fromEntries(JSON.parse(document.getElementById('charts').textContent).map((c) => [c.name, c]));
   const P = axiscalPlots;
   const { digits, valued } = P;
   /** A unit as people write it. */
@@ -59,7 +60,7 @@
   };
 
   const e = view.errors;
-  const state = { from: e.before, to: e.after, directions: new Set(['X', 'Y', 'Z']), rung: e.before, flat: false };
+  const state = { from: e.before, to: e.after, directions: new Set([0, 1, 2]), rung: e.before, flat: false };
 
   // ---------------------------------------------------------------- theme
   const dark = () => document.documentElement.dataset.theme === 'dark'
@@ -158,9 +159,9 @@
 
   // ---------------------------------------------------------------- the first screen
   const proposed = view.proposed.length > 0;
-  plot(id('errors'), () => P.errors(id('errors'), view), true);
+  plot(id('errors'), () => P.draw(id('errors'), charts.error, view), true);
   id('errors-says').textContent = `RMS of ${e.used} touches${view.ladder.some((r) => r.held_out_rms_um !== null) ? '; diamond: cross-validated, each index position left out of the fit in turn' : ''}. No model can fall below about the probe noise.`;
-  plot(id('parameters'), () => P.parameters(id('parameters'), view), true);
+  plot(id('parameters'), () => P.draw(id('parameters'), charts.results, view), true);
   for (const line of view.headline.why) id('why').append(make('li', {}, line));
   const t = view.tolerance;
   const limit = `Shaded: tolerance ${t.error_um} µm at ${t.radius_mm} mm${t.stated ? '' : ' (default; set [tolerance] in the study)'}.`;
@@ -195,7 +196,7 @@
     const body = list.map((p) => {
       const old = view.parameters.find((q) => q.name === p.name);
       const untold = p.status === 'undetermined';
-      const word = untold ? 'not determined' : p.status === 'fixed' ? 'held' : P.JUDGEMENTS[p.judgement].word;
+      const word = untold ? 'not determined' : p.status === 'fixed' ? 'held' : p.judgement_says;
       const kind = { within: 'good', beyond: 'act', open: 'unknown' }[p.judgement] ?? '';
       const cells = [
         untold ? '?' : `${valued(p.value, p.sigma)}${p.expanded === null ? '' : ` ± ${digits(p.expanded, 2)}`} ${unitOf(p.unit)}`,
@@ -222,14 +223,14 @@
       const cards = make('div.grid.cards');
       const alike = (c) => [...c.same_as.map((a) => (d.effects[a] ? `${d.effects[a].name} (${a})` : a)), ...(c.or_else ? [c.or_else] : [])];
       d.candidates.forEach((c, k) => {
-        const stands = P.standing(d, c);
+        const tried = c.held_out_before_um > 0 || c.held_out_after_um > 0;
         const least = c.p_adjusted < 1e-300 ? 'p below 10⁻³⁰⁰' : `p = ${digits(c.p_adjusted, 2)}`;
         const p = c.p_adjusted < 1e-4 ? 'less than 1 in 10 000' : c.p_adjusted > 0.5 ? 'as good as certain' : `1 in ${Math.round(1 / c.p_adjusted)}`;
         const fact = (name, value) => [make('dt', {}, name), make('dd', {}, value)];
         const mends = d.effects[c.effect]?.mends;
-        cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(stands.proposed ? 'span.badge.act' : 'span.badge', {}, stands.word)),
+        cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(c.proposed ? 'span.badge.act' : 'span.badge', {}, d.standings_say[k])),
           make('dl.facts', {}, ...fact('id', c.effect), ...fact('remaining error', `${digits(c.rms_after_um)} µm (now ${digits(d.rms_um)} µm)`),
-            ...fact('cross-validated error', P.tried(c) ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the difference is known to ± ${digits(c.held_out_se_um, 2)} µm` : ''})` : 'cannot be tried with these poses'),
+            ...fact('cross-validated error', tried ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the difference is known to ± ${digits(c.held_out_se_um, 2)} µm` : ''})` : 'cannot be tried with these poses'),
             ...fact('probability by noise alone', `${p} (${least}, all ${d.tested} effects counted in)`),
             ...fact('expected size', c.parameters.map((q) => `${q.name} = ${valued(q.value, q.sigma)}${q.sigma ? ` ± ${digits(q.sigma, 2)}` : ''} ${unitOf(q.unit)}`).join('; ') + (c.plausible ? '' : ' (unusually large)')),
             ...(alike(c).length ? fact('cannot be separated from', alike(c).join('; ')) : []),
@@ -248,12 +249,12 @@
     const beside = pair();
     const s = section('ladder', 'Step by step to the noise', 'Remaining error of each model: lower is better, down to the noise. If the fitted error falls and the cross-validated error does not, the model fits noise.', beside);
     const [f, div] = figure('ladder-plot', [d.candidates.length ? 'Each index position is left out in turn. The cards of the candidates count only touches that the model without the candidate can predict too, so their figures differ.' : '', ...view.ladder_notes].filter(Boolean).join(' '));
-    plot(div, () => P.ladder(div, view));
+    plot(div, () => P.draw(div, charts.ladder, view));
     s.append(f);
     if (d.candidates.length) {
       const c = section('candidates-compared', 'The candidates compared', '', beside);
       const [g, at] = figure('candidates-plot', 'Filled circle: proposed. Hollow circle: explains part. Cross: explains no more than noise could. Diamond: cross-validated error.');
-      plot(at, () => P.candidates(at, view));
+      plot(at, () => P.draw(at, charts.candidates, view));
       c.append(g);
     }
   }
@@ -268,9 +269,11 @@
     const s = section('residuals', 'Residual of each touch, and what it depends on', 'Hollow marks: before; full marks: after; line: the added effect. A residual is a displacement of the ball in X, Y or Z of the machine. The shaded band is twice the probe noise.');
     const plots = [];
     const again = () => plots.forEach((job) => job());
-    const toggles = ['X', 'Y', 'Z'].map((l) => {
-      const sign = { circle: '●', square: '■', 'triangle-up': '▲' }[P.DIRECTION[l].symbol];
-      const b = make('button', { type: 'button', 'aria-pressed': 'true' }, make('span.swatch', { style: `color:${P.DIRECTION[l].colour}`, 'aria-hidden': 'true' }, sign), `in ${l}`);
+    const looks = Object.values(charts).flatMap((c) => c.marks).filter((m) => m.mark === 'touches');
+    const toggles = [0, 1, 2].map((l) => {
+      const look = looks.find((m) => m.direction === l)?.look ?? {};
+      const sign = { circle: '●', square: '■', triangle: '▲' }[look.shape];
+      const b = make('button', { type: 'button', 'aria-pressed': 'true' }, make('span.swatch', { style: `color:${P.inkOf(look.ink, s)}`, 'aria-hidden': 'true' }, sign), `in ${'XYZ'[l]}`);
       b.addEventListener('click', () => {
         if (state.directions.has(l)) state.directions.delete(l); else state.directions.add(l);
         b.setAttribute('aria-pressed', state.directions.has(l));
@@ -288,7 +291,7 @@
     for (const v of [...view.variables].sort((a, b) => (b.share ?? -1) - (a.share ?? -1))) {
       const share = v.share !== null && d.verdict !== 'adequate' && v.share >= 0.05 ? `${Math.round(100 * v.share)} % of what the model does not explain depends on this` : '';
       const [f, div] = figure(`residual-${v.id}`, share);
-      const job = () => P.residuals(div, view, v, state);
+      const job = () => P.draw(div, charts[`residual-${v.id.toLowerCase()}`], view, state);
       plots.push(() => { if (!waiting.has(div)) job(); });
       plot(div, job);
       grid.append(f);
@@ -303,9 +306,11 @@
     const s = section('machine', 'Where on the machine', 'All axes at zero. An arrow at each touch shows its residual.', machineAndDoubt);
     const [f, div] = figure('machine-plot', '', true);
     const scale = make('figcaption', {});
-    const job = () => P.machine(div, view, state).then((parts) => {
-      scale.textContent = `Residuals of the model: ${view.ladder[state.rung].label}. Arrows are drawn ${parts.magnification.toLocaleString('en')} times the residuals; the thick bar is ${digits(parts.scale.um, 1)} µm. ${view.machine.says}.`;
-    });
+    const job = () => {
+      const { times, bar_um: bar } = charts.machine.picture.scales[state.rung];
+      scale.textContent = `Residuals of the model: ${view.ladder[state.rung].label}. Arrows are drawn ${times.toLocaleString('en')} times the residuals; the thick bar is ${digits(bar, 1)} µm. ${view.machine.says}.`;
+      P.draw(div, charts.machine, view, state);
+    };
     plot(div, job);
     f.append(scale);
     s.append(make('div.controls.noprint', {}, 'model: ', select('model whose residuals are drawn', state.rung, (v) => { state.rung = v; job(); })), f);
@@ -334,7 +339,7 @@
     if (view.correlation.names.length > 1) {
       const [f, div] = figure('correlation-plot', proposed ? 'Correlation of the results of the present model: near 0 they are independent; near 1 or −1 only their difference or sum is well known.' : 'Correlation of the results: near 0 they are independent; near 1 or −1 only their difference or sum is well known.');
       div.style.height = `${Math.min(640, 160 + 34 * view.correlation.names.length)}px`;
-      plot(div, () => P.correlation(div, view));
+      plot(div, () => P.draw(div, charts.correlation, view));
       s.append(f);
     }
   }

@@ -23,7 +23,7 @@ pub const PLOTLY: &str = include_str!("../../web/vendor/plotly.min.js");
 /// # Errors
 /// Never for a view that JSON can hold.
 pub fn page(view: &View) -> Result<String> {
-    let data = data(view)?;
+    let (data, charts) = (data(view)?, data(&crate::plots::charts(view))?);
     let runs = view.study.runs.len();
     let about = format!(
         "{}: {} · {} · {} touches in {} · data of {}",
@@ -47,7 +47,7 @@ pub fn page(view: &View) -> Result<String> {
         }
         _ => "",
     };
-    let parts: [(&str, &str); 11] = [
+    let parts: [(&str, &str); 12] = [
         ("title", &text(&title)),
         ("style", STYLE),
         ("about", &text(&about)),
@@ -56,6 +56,7 @@ pub fn page(view: &View) -> Result<String> {
         ("sentence", &text(&view.headline.sentence)),
         ("detail", &text(detail)),
         ("view", &data),
+        ("charts", &charts),
         ("plotly", PLOTLY),
         ("plots", PLOTS),
         ("script", SCRIPT),
@@ -76,12 +77,12 @@ fn fill(template: &str, parts: &[(&str, &str)]) -> String {
     out + rest
 }
 
-/// The view as JSON that may stand inside a script element.
+/// A record as JSON that may stand inside a script element.
 ///
 /// # Errors
-/// Never for a view that JSON can hold.
-pub fn data(view: &View) -> Result<String> {
-    let json = serde_json::to_string(view)
+/// Never for one that JSON can hold.
+pub fn data(record: &impl serde::Serialize) -> Result<String> {
+    let json = serde_json::to_string(record)
         .map_err(|e| Failure::new("report::view", format!("the view cannot be written: {e}")))?;
     Ok(in_script(&json))
 }

@@ -1,24 +1,46 @@
-//! A chart as a record: what is drawn, in the units of its axes, and the numbers behind it.
+//! A chart as a record: what is drawn, in the units of its axes, and the numbers behind it. Files (`render`) and the page (`web/plots.js`)
+//! are drawn from the same record; what is known of every touch stands once in the view, and a mark says which of it is drawn.
 
+use serde::Serialize;
 use std::fmt::Write as _;
 
-/// A colour, red green blue.
-pub type Colour = (u8, u8, u8);
+/// A colour by what it is for: paper and a dark screen have their own shades of the last three.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum Ink {
+    Blue,
+    Red,
+    Green,
+    Purple,
+    Orange,
+    Sky,
+    /// Letters and axes.
+    Ink,
+    /// What stands in the background.
+    Muted,
+    /// A tolerance, or the noise.
+    Band,
+}
 
 /// How a point looks: what differs in colour differs in shape, too.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)]
 pub enum Shape {
     Circle,
     Square,
     Triangle,
     Diamond,
+    Cross,
+    /// An upright stroke.
+    Tick,
 }
 
 /// How points look.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Look {
-    pub colour: Colour,
+    pub ink: Ink,
     pub shape: Shape,
     /// Filled, or its outline alone.
     pub filled: bool,
@@ -28,70 +50,167 @@ pub struct Look {
     pub opacity: f64,
 }
 
+/// How a line is broken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+#[allow(missing_docs)]
+pub enum Dash {
+    Solid,
+    Dash,
+    Dot,
+    DashDot,
+}
+
+/// How a line looks.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Pen {
+    pub ink: Ink,
+    /// px.
+    pub width: u32,
+    pub dash: Dash,
+}
+
 /// A point with a remark.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Point {
     /// Value on the axis below.
     pub x: f64,
     /// Value on the axis at the left.
     pub y: f64,
-    /// For the CSV: which touch, which rung.
+    /// Which touch, which rung.
+    #[serde(skip_serializing_if = "String::is_empty")]
     pub note: String,
 }
 
-/// What is drawn.
-#[derive(Debug, Clone, PartialEq)]
+/// One of the two models that are compared: a reader of the page may choose others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+#[allow(missing_docs)]
+pub enum Model {
+    Before,
+    After,
+}
+
+/// What is drawn. The series' name stands in the legend unless it is empty.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(tag = "mark", rename_all = "kebab-case")]
 pub enum Mark {
-    /// Points; the series' name stands in the legend unless it is empty.
     Points {
         /// Name.
         series: String,
-        /// How they look.
         look: Look,
         points: Vec<Point>,
     },
-    /// A line through points.
+    /// A line through points; a break where a value is not finite.
     Line {
         /// Name.
         series: String,
-        colour: Colour,
-        /// Its width, px.
-        width: u32,
-        /// Dash and gap, px; none: solid.
-        dash: Option<(f64, f64)>,
-        /// Where it goes; a break where a value is not finite.
+        pen: Pen,
         points: Vec<Point>,
     },
-    /// A filled rectangle: x from, x to, y from, y to; the numbers stand in the CSV where the series has a name.
+    /// A filled rectangle; without ends as long as the axis. The numbers stand in the CSV where the series has a name.
     Area {
         /// Name.
         series: String,
-        colour: Colour,
+        ink: Ink,
         /// 0 (unseen) to 1.
         opacity: f64,
+        /// From, to.
         x: (f64, f64),
+        /// From, to.
         y: (f64, f64),
+    },
+    /// A line across the whole chart with its name.
+    Rule {
+        /// Name.
+        series: String,
+        pen: Pen,
+        at: f64,
+        /// At a value of the axis below, or at the left?
+        upright: bool,
     },
     /// A word at a place.
     Word {
-        /// The word.
         text: String,
         /// Where it begins.
         at: (f64, f64),
     },
+    /// A square of numbers from -1 to 1, row by row on axes of names.
+    Cells { rows: Vec<Vec<Option<f64>>> },
+    /// The residual of each touch that is used, against the chart's variable.
+    Touches {
+        /// Name.
+        series: String,
+        look: Look,
+        /// Of the touches that show a displacement in this direction of R; none: of all, along their faces.
+        direction: Option<usize>,
+        model: Model,
+    },
+    /// What the model after has and the one before has not, against the chart's variable.
+    Added {
+        /// Name.
+        series: String,
+        pen: Pen,
+        /// As of the touches.
+        direction: Option<usize>,
+    },
+    /// Lines in space, mm in R.
+    Wire { pen: Pen, lines: Vec<Vec<[f64; 3]>> },
+    /// A word in space, mm in R.
+    Name { text: String, at: [f64; 3] },
+    /// The residual of each touch of a stage as an arrow.
+    Arrows {
+        /// Name.
+        series: String,
+        pen: Pen,
+        /// Number of its word in the view's touches.
+        stage: usize,
+    },
+    /// The touches that are not used, in space.
+    Unused {
+        /// Name.
+        series: String,
+        look: Look,
+    },
+}
+
+/// What a picture in space needs besides its marks.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Picture {
+    /// Middle of the touches, mm.
+    pub centre: [f64; 3],
+    /// How far they reach, mm.
+    pub extent: f64,
+    /// Where the bar of the scale stands, mm.
+    pub foot: [f64; 3],
+    /// For each rung of the ladder.
+    pub scales: Vec<Scale>,
+}
+
+/// How long residuals are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Scale {
+    /// So many times as long as they are.
+    pub times: f64,
+    /// Length of the bar of the scale, µm.
+    pub bar_um: f64,
 }
 
 /// An axis of a chart.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Axis {
     /// Title, with its unit; empty: nothing stands at this axis.
     pub title: String,
+    /// The same where there is little room.
+    pub short: String,
     /// Lowest and highest value.
     pub range: (f64, f64),
     /// Names at whole numbers, in place of numbers.
     pub names: Vec<String>,
     /// Is it logarithmic?
     pub log: bool,
+    /// Id of the view's variable that it shows.
+    pub variable: Option<String>,
 }
 
 impl Axis {
@@ -100,13 +219,22 @@ impl Axis {
     pub fn new(title: impl Into<String>, range: (f64, f64)) -> Self {
         let (low, high) = range;
         let usable = low.is_finite() && high.is_finite() && high > low;
-        Self { title: title.into(), range: if usable { range } else { (0.0, 1.0) }, names: Vec::new(), log: false }
+        let (title, range) = (title.into(), if usable { range } else { (0.0, 1.0) });
+        Self { short: title.clone(), title, range, names: Vec::new(), log: false, variable: None }
+    }
+
+    /// With a title for where there is little room.
+    #[must_use]
+    pub fn or(mut self, short: &str) -> Self {
+        short.clone_into(&mut self.short);
+        self
     }
 
     /// An axis of names, the first one at 0.
     #[must_use]
     pub fn named(names: Vec<String>) -> Self {
-        Self { range: (-0.6, names.len() as f64 - 0.4), title: String::new(), names, log: false }
+        let range = (-0.6, names.len() as f64 - 0.4);
+        Self { names, ..Self::new("", range) }
     }
 
     /// Share of the way along it, 0 to 1 inside.
@@ -158,29 +286,34 @@ fn nice(x: f64) -> f64 {
         }
 }
 
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Chart {
     /// Name of its files.
     pub name: String,
     pub title: String,
+    /// For who cannot see it.
+    pub says: String,
     /// The axis below.
     pub x: Axis,
     /// The axis at the left.
     pub y: Axis,
     /// The axis at the left counts from the top, as lists do.
     pub downwards: bool,
-    /// Equal lengths on both axes, no numbers: a picture.
-    pub picture: bool,
+    /// A picture in space, no numbers at its axes.
+    pub picture: Option<Picture>,
+    /// The page shows names of series, too; else a caption says them.
+    pub legend: bool,
     /// Height over width.
     pub aspect: f64,
     /// What is drawn, the first one at the bottom.
     pub marks: Vec<Mark>,
     /// The numbers, where they are not those of the marks.
+    #[serde(skip)]
     pub csv: Option<String>,
 }
 
 impl Chart {
-    /// The numbers behind it.
+    /// The numbers behind it, once it is on paper.
     #[must_use]
     pub fn to_csv(&self) -> String {
         if let Some(csv) = &self.csv {

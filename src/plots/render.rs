@@ -1,7 +1,7 @@
 //! A chart as SVG and PNG. The letters of the PNG are those of a font that is inside the program: a machine without fonts
 //! draws the same.
 
-use super::chart::{Axis, Chart, Colour, Look, Mark, Shape};
+use super::chart::{Axis, Chart, Dash, Ink, Look, Mark, Pen, Shape};
 use crate::diag::{Failure, Result};
 use plotters::backend::{BitMapBackend, DrawingBackend, SVGBackend};
 use plotters::coord::Shift;
@@ -14,9 +14,9 @@ use std::sync::OnceLock;
 /// Width of a plot, px.
 const WIDTH: u32 = 1200;
 
-const INK: Colour = (22, 25, 29);
-const GRID: Colour = (223, 227, 232);
-const MUTED: Colour = (89, 97, 107);
+const GRID: RGBColor = RGBColor(223, 227, 232);
+const FRAME: RGBColor = RGBColor(89, 97, 107);
+const INK: RGBColor = rgb(Ink::Ink);
 
 const FONT: &[u8] = include_bytes!("../../web/vendor/DejaVuSans.ttf");
 
@@ -83,22 +83,35 @@ pub fn png(chart: &Chart) -> Result<Vec<u8>> {
     Ok(out)
 }
 
-fn rgb(c: Colour) -> RGBColor {
-    RGBColor(c.0, c.1, c.2)
+/// On white paper. The colours are Okabe and Ito's, which colour-blind people tell apart.
+const fn rgb(ink: Ink) -> RGBColor {
+    match ink {
+        Ink::Blue | Ink::Band => RGBColor(0, 114, 178),
+        Ink::Red => RGBColor(213, 94, 0),
+        Ink::Green => RGBColor(0, 158, 115),
+        Ink::Purple => RGBColor(204, 121, 167),
+        Ink::Orange => RGBColor(230, 159, 0),
+        Ink::Sky => RGBColor(86, 180, 233),
+        Ink::Ink => RGBColor(22, 25, 29),
+        Ink::Muted => RGBColor(120, 126, 134),
+    }
 }
 
-fn stroke(c: Colour, width: u32, opacity: f64) -> ShapeStyle {
-    ShapeStyle { color: rgb(c).mix(opacity), filled: false, stroke_width: width }
+fn stroke(c: RGBColor, width: u32, opacity: f64) -> ShapeStyle {
+    ShapeStyle { color: c.mix(opacity), filled: false, stroke_width: width }
 }
 
-fn fill(c: Colour, opacity: f64) -> ShapeStyle {
-    ShapeStyle { color: rgb(c).mix(opacity), filled: true, stroke_width: 0 }
+fn fill(ink: Ink, opacity: f64) -> ShapeStyle {
+    /// What is below a band is seen through it.
+    const BAND: f64 = 0.13;
+    let opacity = if ink == Ink::Band { BAND * opacity } else { opacity };
+    ShapeStyle { color: rgb(ink).mix(opacity), filled: true, stroke_width: 0 }
 }
 
-fn letters<'a>(size: f64, colour: Colour, h: HPos, v: VPos) -> TextStyle<'a> {
+fn letters<'a>(size: f64, h: HPos, v: VPos) -> TextStyle<'a> {
     let font: FontDesc = FontDesc::new(FontFamily::SansSerif, size, FontStyle::Normal);
     let mut style = TextStyle::from(font).pos(Pos::new(h, v));
-    style.color = rgb(colour).to_backend_color();
+    style.color = INK.to_backend_color();
     style
 }
 
@@ -145,15 +158,15 @@ fn draw<DB: DrawingBackend>(root: &DrawingArea<DB, Shift>, chart: &Chart) -> Dra
     let (w, h) = root.dim_in_pixel();
     let legend = legend(chart);
     let top = 56.0 + if legend.is_empty() { 0.0 } else { 26.0 };
-    let left = if chart.picture { 20.0 } else { 44.0 + widest(&chart.y) };
-    let bottom = if chart.picture { 20.0 } else { 62.0 };
+    let left = if chart.picture.is_some() { 20.0 } else { 44.0 + widest(&chart.y) };
+    let bottom = if chart.picture.is_some() { 20.0 } else { 62.0 };
     let mut frame = Frame { chart, left, top, width: f64::from(w) - left - 30.0, height: f64::from(h) - top - bottom };
-    if chart.picture {
+    if chart.picture.is_some() {
         equal_lengths(&mut frame);
     }
-    root.draw(&Text::new(chart.title.clone(), (20, 16), letters(20.0, INK, HPos::Left, VPos::Top)))?;
+    root.draw(&Text::new(chart.title.clone(), (20, 16), letters(20.0, HPos::Left, VPos::Top)))?;
     draw_legend(root, &legend)?;
-    if !chart.picture {
+    if !chart.picture.is_some() {
         axes(root, &frame)?;
     }
     for mark in &chart.marks {
@@ -177,7 +190,7 @@ fn legend(chart: &Chart) -> Vec<&Mark> {
     let mut out: Vec<&Mark> = Vec::new();
     let name = |m: &Mark| match m {
         Mark::Points { series, .. } | Mark::Line { series, .. } | Mark::Area { series, .. } => series.clone(),
-        Mark::Word { .. } => String::new(),
+        _ => String::new(),
     };
     for mark in &chart.marks {
         if !name(mark).is_empty() && !out.iter().any(|m| name(m) == name(mark)) {
@@ -196,18 +209,18 @@ fn draw_legend<DB: DrawingBackend>(root: &DrawingArea<DB, Shift>, legend: &[&Mar
                 symbol(root, (x, y), &Look { size: 6, opacity: 1.0, ..*look })?;
                 series
             }
-            Mark::Line { series, colour, width, dash, .. } => {
+            Mark::Line { series, pen, .. } => {
                 let ends = [(f64::from(x - 12), f64::from(y)), (f64::from(x + 12), f64::from(y))];
-                polyline(root, &ends, *colour, *width, *dash)?;
+                polyline(root, &ends, *pen)?;
                 series
             }
-            Mark::Area { series, colour, opacity, .. } => {
-                root.draw(&Rectangle::new([(x - 12, y - 7), (x + 12, y + 7)], fill(*colour, *opacity)))?;
+            Mark::Area { series, ink, opacity, .. } => {
+                root.draw(&Rectangle::new([(x - 12, y - 7), (x + 12, y + 7)], fill(*ink, *opacity)))?;
                 series
             }
-            Mark::Word { .. } => continue,
+            _ => continue,
         };
-        root.draw(&Text::new(series.clone(), (x + 18, y), letters(14.0, INK, HPos::Left, VPos::Center)))?;
+        root.draw(&Text::new(series.clone(), (x + 18, y), letters(14.0, HPos::Left, VPos::Center)))?;
         x += 52 + (8.0 * series.chars().count() as f64) as i32;
     }
     Ok(())
@@ -222,19 +235,23 @@ fn axes<DB: DrawingBackend>(root: &DrawingArea<DB, Shift>, frame: &Frame) -> Dra
         root.draw(&PathElement::new(vec![(x, top), (x, bottom)], stroke(GRID, 1, 1.0)))?;
         for (k, line) in text.lines().enumerate() {
             let at = (x, bottom + 8 + 15 * k as i32);
-            root.draw(&Text::new(line.to_owned(), at, letters(14.0, INK, HPos::Center, VPos::Top)))?;
+            root.draw(&Text::new(line.to_owned(), at, letters(14.0, HPos::Center, VPos::Top)))?;
         }
     }
     for (v, text) in chart.y.ticks() {
         let y = frame.y(v) as i32;
         root.draw(&PathElement::new(vec![(left, y), (right, y)], stroke(GRID, 1, 1.0)))?;
-        root.draw(&Text::new(text, (left - 8, y), letters(14.0, INK, HPos::Right, VPos::Center)))?;
+        let lines: Vec<&str> = text.lines().collect();
+        for (k, line) in lines.iter().enumerate() {
+            let at = (left - 8, y + (15.0 * (k as f64 - 0.5 * (lines.len() as f64 - 1.0))) as i32);
+            root.draw(&Text::new((*line).to_owned(), at, letters(14.0, HPos::Right, VPos::Center)))?;
+        }
     }
-    root.draw(&Rectangle::new([(left, top), (right, bottom)], stroke(MUTED, 1, 1.0)))?;
+    root.draw(&Rectangle::new([(left, top), (right, bottom)], stroke(FRAME, 1, 1.0)))?;
     let middle = ((left + right) / 2, bottom + 34);
-    root.draw(&Text::new(chart.x.title.clone(), middle, letters(16.0, INK, HPos::Center, VPos::Top)))?;
+    root.draw(&Text::new(chart.x.title.clone(), middle, letters(16.0, HPos::Center, VPos::Top)))?;
     if !chart.y.title.is_empty() {
-        let style = letters(16.0, INK, HPos::Center, VPos::Top).transform(FontTransform::Rotate270);
+        let style = letters(16.0, HPos::Center, VPos::Top).transform(FontTransform::Rotate270);
         root.draw(&Text::new(chart.y.title.clone(), (8, (top + bottom) / 2), style))?;
     }
     Ok(())
@@ -247,51 +264,53 @@ fn draw_mark<DB: DrawingBackend>(root: &DrawingArea<DB, Shift>, frame: &Frame, m
                 symbol(root, p, look)?;
             }
         }
-        Mark::Line { colour, width, dash, points, .. } => {
+        Mark::Line { pen, points, .. } => {
             let mut run: Vec<(f64, f64)> = Vec::new();
             for p in points {
                 match frame.at(p.x, p.y) {
                     Some((x, y)) => run.push((f64::from(x), f64::from(y))),
-                    None => polyline(root, &std::mem::take(&mut run), *colour, *width, *dash)?,
+                    None => polyline(root, &std::mem::take(&mut run), *pen)?,
                 }
             }
-            polyline(root, &run, *colour, *width, *dash)?;
+            polyline(root, &run, *pen)?;
         }
-        Mark::Area { colour, opacity, x, y, .. } => {
+        Mark::Area { ink, opacity, x, y, .. } => {
             let clip = |v: f64, axis: &Axis| v.clamp(axis.range.0, axis.range.1);
             let (cx, cy) = (&frame.chart.x, &frame.chart.y);
             if let (Some(a), Some(b)) = (frame.at(clip(x.0, cx), clip(y.0, cy)), frame.at(clip(x.1, cx), clip(y.1, cy)))
             {
                 let corners = [(a.0.min(b.0), a.1.min(b.1)), (a.0.max(b.0), a.1.max(b.1))];
-                root.draw(&Rectangle::new(corners, fill(*colour, *opacity)))?;
+                root.draw(&Rectangle::new(corners, fill(*ink, *opacity)))?;
             }
         }
         Mark::Word { text, at } => {
             if let Some((x, y)) = frame.at(at.0, at.1) {
-                root.draw(&Text::new(text.clone(), (x + 6, y - 6), letters(15.0, INK, HPos::Left, VPos::Bottom)))?;
+                root.draw(&Text::new(text.clone(), (x + 6, y - 6), letters(15.0, HPos::Left, VPos::Bottom)))?;
             }
         }
+        // what stands for touches, space or a whole axis has become one of these on paper
+        _ => {}
     }
     Ok(())
 }
 
 /// A line, dashed where asked.
-fn polyline<DB: DrawingBackend>(
-    root: &DrawingArea<DB, Shift>,
-    points: &[(f64, f64)],
-    colour: Colour,
-    width: u32,
-    dash: Option<(f64, f64)>,
-) -> Drawn<DB> {
+fn polyline<DB: DrawingBackend>(root: &DrawingArea<DB, Shift>, points: &[(f64, f64)], pen: Pen) -> Drawn<DB> {
     if points.len() < 2 {
         return Ok(());
     }
-    let style = stroke(colour, width, 1.0);
+    let style = stroke(rgb(pen.ink), pen.width, 1.0);
     let whole = |p: &(f64, f64)| (p.0.round() as i32, p.1.round() as i32);
-    let Some((on, off)) = dash else {
+    let (on, off) = match pen.dash {
+        Dash::Solid => (f64::INFINITY, 0.0),
+        Dash::Dash => (9.0, 6.0),
+        Dash::Dot => (3.0, 4.0),
+        Dash::DashDot => (14.0, 6.0),
+    };
+    if pen.dash == Dash::Solid {
         root.draw(&PathElement::new(points.iter().map(whole).collect::<Vec<_>>(), style))?;
         return Ok(());
-    };
+    }
     let mut left = on;
     let mut drawing = true;
     for pair in points.windows(2) {
@@ -320,12 +339,18 @@ fn polyline<DB: DrawingBackend>(
 
 fn symbol<DB: DrawingBackend>(root: &DrawingArea<DB, Shift>, p: (i32, i32), look: &Look) -> Drawn<DB> {
     let r = look.size;
-    let style = if look.filled { fill(look.colour, look.opacity) } else { stroke(look.colour, 2, look.opacity) };
+    let outline = stroke(rgb(look.ink), 2, look.opacity);
+    let style = if look.filled { fill(look.ink, look.opacity) } else { outline };
     let corners: Vec<(i32, i32)> = match look.shape {
         Shape::Circle => return root.draw(&Circle::new(p, r, style)),
         Shape::Square => vec![(p.0 - r, p.1 - r), (p.0 + r, p.1 - r), (p.0 + r, p.1 + r), (p.0 - r, p.1 + r)],
         Shape::Triangle => vec![(p.0 - r, p.1 + r), (p.0, p.1 - r), (p.0 + r, p.1 + r)],
         Shape::Diamond => vec![(p.0 - r, p.1), (p.0, p.1 - r), (p.0 + r, p.1), (p.0, p.1 + r)],
+        Shape::Tick => return root.draw(&PathElement::new(vec![(p.0, p.1 - r), (p.0, p.1 + r)], outline)),
+        Shape::Cross => {
+            root.draw(&PathElement::new(vec![(p.0 - r, p.1 - r), (p.0 + r, p.1 + r)], outline))?;
+            return root.draw(&PathElement::new(vec![(p.0 - r, p.1 + r), (p.0 + r, p.1 - r)], outline));
+        }
     };
     if look.filled {
         root.draw(&Polygon::new(corners, style))

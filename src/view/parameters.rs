@@ -66,6 +66,7 @@ fn record(t: &Tolerance, p: &Parameter, says: String, effects: &[&Effect]) -> Pa
         tolerance,
         tolerance_um: tolerance.and_then(size),
         judgement,
+        judgement_says: judgement.says(),
     }
 }
 

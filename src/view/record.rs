@@ -5,9 +5,11 @@
 use super::ViewMaterial;
 use crate::compare::Split;
 use crate::compare::model_ladder::{Curve, Kind};
-use crate::diagnose::Diagnosis;
+use crate::diagnose::answer::Candidate;
+use crate::diagnose::{Diagnosis, Verdict};
 use crate::fit::outcome::{Combination, Status, Undetermined};
 use crate::machine::Form;
+use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::study::tolerance::Tolerance;
 use crate::tables::compensation::Term;
 use crate::words::headline::Headline;
@@ -139,6 +141,14 @@ pub enum Judgement {
     None,
 }
 
+impl Judgement {
+    /// In a word.
+    #[must_use]
+    pub fn says(self) -> &'static str {
+        crate::words::standing::judgement(self)
+    }
+}
+
 /// A result.
 #[derive(Debug, Clone, Serialize)]
 pub struct ParameterRecord {
@@ -170,6 +180,8 @@ pub struct ParameterRecord {
     pub tolerance_um: Option<f64>,
     /// How it stands to it.
     pub judgement: Judgement,
+    /// The same in a word.
+    pub judgement_says: &'static str,
 }
 
 /// A model on these touches.
@@ -201,8 +213,46 @@ pub struct DiagnosisRecord {
     /// As `axiscal diagnose --json` gives it.
     #[serde(flatten)]
     pub answer: Diagnosis,
+    /// How each candidate stands.
+    #[serde(skip)]
+    pub standings: Vec<Standing>,
+    /// The same in words.
+    pub standings_say: Vec<&'static str>,
     /// By id of an effect: name and what mends it, for every effect that is named anywhere in the view.
     pub effects: BTreeMap<String, EffectRecord>,
+}
+
+/// How a candidate stands: does it pass, was it tried on touches left out, is it the first?
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    Proposed,
+    NoMoreThanNoise,
+    /// There is too little data.
+    CannotBeJudged,
+    /// These poses do not allow to leave touches out.
+    CannotBeTried,
+    /// It passes, and touches left out do not bear it out.
+    NotBorneOut,
+    /// The first candidate explains more.
+    LessThanTheFirst,
+}
+
+impl Standing {
+    /// Those that explain a part.
+    pub const PARTS: [Self; 4] = [Self::CannotBeJudged, Self::CannotBeTried, Self::NotBorneOut, Self::LessThanTheFirst];
+
+    fn of(d: &Diagnosis, place: usize, candidate: &Candidate) -> Self {
+        let sizes = [candidate.held_out_before_um, candidate.held_out_after_um];
+        let is_tried = sizes.iter().flatten().any(|um| *um > 0.0);
+        match d.verdict {
+            _ if candidate.proposed => Self::Proposed,
+            _ if candidate.p_adjusted >= FAMILY_LEVEL => Self::NoMoreThanNoise,
+            Verdict::TooLittleData(_) => Self::CannotBeJudged,
+            Verdict::Unexplained(_) if !is_tried => Self::CannotBeTried,
+            _ if place == 0 => Self::NotBorneOut,
+            _ => Self::LessThanTheFirst,
+        }
+    }
 }
 
 /// An effect in words.
@@ -387,6 +437,20 @@ pub struct Touches {
     pub rejected: Vec<Option<String>>,
 }
 
+impl Touches {
+    /// A variable of the view at a touch.
+    #[must_use]
+    pub fn value(&self, variable: &str, touch: usize) -> Option<f64> {
+        match variable {
+            "time" => Some(self.time_h[touch]),
+            "order" => Some((touch + 1) as f64),
+            "approach" => self.approach_deg[touch],
+            "stylus" => Some(self.stylus_mm[touch]),
+            axis => self.axes.get(axis).and_then(|a| a.get(touch)).copied(),
+        }
+    }
+}
+
 /// A touch that the model cannot use.
 #[derive(Debug, Clone, Serialize)]
 pub struct UnusableRecord {
@@ -433,5 +497,7 @@ pub(super) fn diagnosis(m: &ViewMaterial) -> DiagnosisRecord {
             });
         }
     }
-    DiagnosisRecord { answer: d.clone(), effects }
+    let standings: Vec<Standing> = d.candidates.iter().enumerate().map(|(i, c)| Standing::of(d, i, c)).collect();
+    let standings_say = standings.iter().map(|s| crate::words::standing::candidate(*s)).collect();
+    DiagnosisRecord { answer: d.clone(), standings, standings_say, effects }
 }

@@ -10,4 +10,5 @@ pub(crate) mod log;
 pub(crate) mod next_calls;
 pub(crate) mod next_steps;
 mod not_explained;
+pub(crate) mod standing;
 pub(crate) mod why;

@@ -44,6 +44,42 @@ async function opensFromDisk(t) {
   await page.screenshot({ path: join(out, "report-dark.png") });
 }
 
+/** The page and the files of --plots show the same numbers: every point, line and bar of a file is in the page's plot, and no other. */
+async function sameAsFiles(t) {
+  const folder = measured(t.dir, "same-as-files");
+  const file = join(folder, "report.html");
+  axiscal("report", join(folder, "study.toml"), "--out", file, "--plots", join(folder, "plots"));
+  const [page, seen] = await watched(t.context);
+  await page.goto(pathToFileURL(file).href);
+  await page.waitForSelector("#parameters .main-svg");
+  await page.evaluate(() => dispatchEvent(new Event("beforeprint")));
+  await page.waitForTimeout(500);
+  const ofFile = (name) => readFileSync(join(folder, "plots", `${name}.csv`), "utf8").trim().split("\n").slice(1).map((line) => line.match(/("(?:[^"]|"")*"|[^,]*)(?:,|$)/g).map((f) => f.replace(/,$/, "")));
+  const ofPage = (id, kept) => page.evaluate(([at, mode]) => document.getElementById(at).data.filter((d) => d.mode === mode).flatMap((d) => d.x.map((x, i) => [x, d.y[i]])), [id, kept]);
+  const sorted = (pairs) => pairs.map(([x, y]) => `${Number(x).toFixed(6)} ${Number(y).toFixed(6)}`).sort();
+  // Z touches of a squareness: the points of both models and what lies between them
+  let touches = 0;
+  for (const id of await page.evaluate(() => [...document.querySelectorAll("[id^=residual-].plot")].map((e) => e.id))) {
+    const rows = ofFile(id.toLowerCase());
+    const points = rows.filter(([series]) => /(before|after)$/.test(series)).map(([, x, y]) => [x, y]);
+    const lines = rows.filter(([series]) => /added$/.test(series)).map(([, x, y]) => [x, y]);
+    equal(sorted(await ofPage(id, "markers")), sorted(points), `points of ${id}`);
+    equal(sorted(await ofPage(id, "lines")), sorted(lines), `lines of ${id}`);
+    touches = Math.max(touches, points.length);
+  }
+  holds(touches > 300, `${touches} points`);
+  const rungs = ofFile("ladder");
+  const ladder = await ofPage("ladder-plot", "markers");
+  for (const [step, , , rms, held] of rungs) for (const y of [rms, held]) holds(sorted(ladder).includes(sorted([[step, y]])[0]), `step ${step}: ${y} of ${JSON.stringify(ladder)}`);
+  const results = ofFile("results").filter((r) => r[6] !== "").map((r) => Number(r[6]).toFixed(6)).sort();
+  equal((await ofPage("parameters", "markers")).map(([x]) => x.toFixed(6)).filter((x) => results.includes(x)).length >= Math.min(12, results.length), true, "results");
+  const bars = await page.evaluate(() => document.getElementById("errors").layout.shapes.filter((s) => s.type === "rect").map((s) => s.x1));
+  equal(bars.map((x) => x.toFixed(6)), ofFile("error").slice(0, bars.length).map((r) => Number(r[1]).toFixed(6)), "bars of the error");
+  const used = ofFile("machine").filter((r) => r.includes("true")).length;
+  equal(await page.evaluate(() => document.getElementById("machine-plot").data.filter((d) => d.mode === "markers" && d.marker.symbol === "diamond").reduce((n, d) => n + d.x.length, 0)), used, "arrows");
+  equal(seen.errors, [], "errors in the console");
+}
+
 /** What a person must see without scrolling on a small screen: verdict, both pictures, what to do. */
 async function firstScreen(t) {
   const folder = measured(t.dir, "first-screen");
@@ -177,6 +213,7 @@ async function hostileNames(t) {
 
 export const reportCases = [
   ["report_opens_from_disk_without_a_network", opensFromDisk],
+  ["report_draws_the_same_as_its_files", sameAsFiles],
   ["report_first_screen", firstScreen],
   ["report_printed", printed],
   ["report_on_a_telephone", onATelephone],

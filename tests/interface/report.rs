@@ -62,7 +62,7 @@ fn one_page_holds_everything_and_fetches_nothing() {
     let page = std::fs::read_to_string(folder.path().join("r.html")).unwrap();
     assert_eq!(answer["bytes"], page.len());
     assert!(page.len() < 6_000_000, "{}", page.len());
-    assert_eq!(page.matches("</script").count(), 4, "something has ended a script");
+    assert_eq!(page.matches("</script").count(), 5, "something has ended a script");
     assert!(!page.contains("document.title='broken'</script>"));
     for asks in ["src=\"", "<link rel=\"stylesheet", "@import", "<iframe", "<img", "<form"] {
         assert!(!page.split("<script type=").next().unwrap().contains(asks), "{asks}");
