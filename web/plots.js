@@ -94,13 +94,11 @@ globalThis.axiscalPlots = (() => {
     return { symbol: SYMBOL[look.shape] + open, size: 1.3 * look.size, color: inkOf(look.ink, el), opacity: look.opacity, line: { width: look.filled ? 0 : look.size > 5 ? 2 : 1, color: inkOf(look.ink, el) } };
   }
 
-  /** A name in two lines, where it is too long for one; what is too long for two is cut. */
-  function inTwo(name, most) {
-    if (name.length <= most) return name;
-    const at = name.lastIndexOf(' ', most);
-    const [first, second] = at > 0 ? [name.slice(0, at), name.slice(at + 1)] : [name.slice(0, most - 1), name.slice(most - 1)];
-    return `${first}\n${second.length > most ? `${second.slice(0, most - 1)}…` : second}`;
-  }
+  /** A long name in several lines. */
+  const inLines = (name, most) => name.split(' ').reduce((all, word) => {
+    const last = all.at(-1);
+    return last !== undefined && last.length + word.length < most ? [...all.slice(0, -1), `${last} ${word}`] : [...all, word];
+  }, []).join('\n');
 
   /** An axis of the layout: names at whole numbers, powers of ten, or numbers; where there is little room fewer and smaller ones. */
   function axisOf(axis, isX, chart, el, free) {
@@ -114,7 +112,7 @@ globalThis.axiscalPlots = (() => {
     const [low, high] = axis.range;
     if (axis.names.length) {
       const most = narrow(el, 450) ? 24 : 44;
-      return { ...out, tickvals: axis.names.map((_, i) => i), ticktext: axis.names.map((name) => lines(name.split('\n').map((line) => inTwo(line, most)).join('\n'))), range: !isX && chart.downwards ? [high, low] : [low, high],
+      return { ...out, tickvals: axis.names.map((_, i) => i), ticktext: axis.names.map((name) => lines(name.split('\n').map((line) => inLines(line, most)).join('\n'))), range: !isX && chart.downwards ? [high, low] : [low, high],
         ticks: '', zeroline: false, gridcolor: 'rgba(0,0,0,0)', tickfont: { size: narrow(el, 450) ? 10 : 11 }, ...(isX && axis.names.length > 6 ? { tickangle: -45 } : {}) };
     }
     if (axis.log) {
@@ -125,13 +123,13 @@ globalThis.axiscalPlots = (() => {
   }
 
   /** Lines and their names across a chart: of two upright ones each name is on the side away from the other. */
-  function rule(mark, others, chart, el) {
+  function rule(mark, isLower, isOneOfTwo, chart, el) {
     const line = { type: 'line', line: penOf(mark.pen, el) };
     const text = { text: safe(mark.series), showarrow: false, font: { size: 11 } };
     if (!mark.upright) {
       return [{ ...line, x0: 0, x1: 1, xref: 'paper', y0: mark.at, y1: mark.at }, { ...text, x: 0, xref: 'paper', xanchor: 'left', xshift: 4, y: chart.y.log ? Math.log10(mark.at) : mark.at, yanchor: 'top', yshift: -2 }];
     }
-    const right = others.length ? others.some((o) => o.at > mark.at) : mark.at > 0.55 * chart.x.range[1];
+    const right = isOneOfTwo ? isLower : mark.at > 0.55 * chart.x.range[1];
     return [{ ...line, x0: mark.at, x1: mark.at, y0: 0, y1: 1, yref: 'paper' }, { ...text, x: mark.at, xanchor: right ? 'right' : 'left', y: 1, yref: 'paper', yanchor: 'bottom' }];
   }
 
@@ -169,7 +167,7 @@ globalThis.axiscalPlots = (() => {
     switch (mark.mark) {
       case 'points':
         return [{ type: 'scatter', mode: 'markers', x: mark.points.map((p) => p.x), y: mark.points.map((p) => p.y), marker: marker(mark.look, el), cliponaxis: false, ...named,
-          text: mark.points.map((p) => safe(p.note ?? '')), hovertemplate: `%{text} %{${value}:.2f} µm<extra>${named.name}</extra>` }];
+          text: mark.points.map((p) => safe(p.note ?? '')), hovertemplate: `%{text} %{${value}:.3g} µm<extra>${named.name}</extra>` }];
       case 'line':
         return [{ type: 'scatter', mode: 'lines', x: mark.points.map((p) => p.x), y: mark.points.map((p) => p.y), line: penOf(mark.pen, el), hoverinfo: 'skip', ...named }];
       case 'word':
@@ -193,7 +191,7 @@ globalThis.axiscalPlots = (() => {
     if (chart.picture) return picture(el, chart, view, options);
     const chosen = { from: view.errors.before, to: view.errors.after, directions: new Set([0, 1, 2]), ...options };
     const of = (kind) => chart.marks.filter((m) => m.mark === kind);
-    const rules = of('rule').map((m) => rule(m, of('rule').filter((o) => o !== m), chart, el));
+    const rules = of('rule').map((m, i, all) => rule(m, all.some((o, k) => o.at > m.at || (o.at === m.at && k > i)), all.length > 1, chart, el));
     const small = narrow(el, 450);
     const isOfTouches = of('touches').length > 0;
     const legend = !chart.legend ? {} : small && chart.downwards ? { y: -0.42, yanchor: 'top', font: { size: 10 } } : { y: chart.downwards ? 1.12 : 1.02, yanchor: 'bottom' };
@@ -205,7 +203,9 @@ globalThis.axiscalPlots = (() => {
       xaxis: axisOf(chart.x, true, chart, el, isOfTouches), yaxis: axisOf(chart.y, false, chart, el, isOfTouches),
       shapes: [...of('area').map((m) => area(m, el)), ...rules.map(([line]) => line)], annotations: rules.map(([, text]) => text),
     });
-    return react(el, chart.marks.flatMap((m) => traces(el, chart, m, view, chosen)), lay, chart.says);
+    const label = (rung) => view.ladder[rung].label;
+    const models = !isOfTouches ? '' : chosen.from === chosen.to ? ` Model: ${label(chosen.to)}.` : ` Before: ${label(chosen.from)}; after: ${label(chosen.to)}.`;
+    return react(el, chart.marks.flatMap((m) => traces(el, chart, m, view, chosen)), lay, chart.says + models);
   }
 
   // ---------------------------------------------------------------- in space
@@ -285,7 +285,7 @@ globalThis.axiscalPlots = (() => {
       ? { ...common, xaxis: { ...off, range: [around[0] - 1.5 * r, around[0] + 1.5 * r] }, yaxis: { ...off, scaleanchor: 'x', range: [around[1] - 1.2 * r, around[1] + r] } }
       : { ...common, scene: { aspectmode: 'cube', camera: { eye: { x: 1.1, y: -1.47, z: 0.74 }, center: { x: 0, y: 0, z: -0.18 } }, xaxis: side('X, mm', 0), yaxis: side('Y, mm', 1), zaxis: side('Z, mm', 2) } });
     el.dataset.magnification = times;
-    return react(el, all, lay, chart.says);
+    return react(el, all, lay, `${chart.says} Model: ${view.ladder[rung].label}; arrows ${times} times as long as the residuals.`);
   }
 
   return { draw, digits, valued, source, inkOf };

@@ -173,7 +173,7 @@ fn parameters(task: &Task, alone: &LinearisedPlan, view: &LinearisedPlan) -> Vec
         .library
         .candidates()
         .iter()
-        .filter(|c| task.catalogue.get(&c.id, task.machine).is_none_or(|e| !e.is_repeated()))
+        .filter(|c| task.catalogue.get(&c.id, task.machine).is_none_or(|e| !e.is_repeated() && !e.is_incident()))
         .flat_map(|c| c.variants[0].columns.clone())
         .collect();
     let acting = observe(&view.jacobian);

@@ -10,7 +10,6 @@ use crate::fit::Fit;
 use crate::fit::candidates::NoValue;
 use crate::model::catalogue::Place;
 use crate::model::data::Origin;
-use crate::model::formula::slot;
 use crate::search::dependence::Dependence;
 use crate::search::groups::Group;
 use crate::search::multiplicity::FAMILY_LEVEL;
@@ -282,9 +281,8 @@ fn without_temperature(fit: &Fit, seen: &Examination) -> Vec<String> {
 fn room_or_time(fit: &Fit, seen: &Examination, candidates: &mut [Candidate]) {
     let Some((first, group)) = candidates.first_mut().filter(|c| c.proposed).zip(seen.groups.first()) else { return };
     let effect = seen.named.effects[group.first()];
-    let jumps = effect.parameters.iter().any(|p| p.between == Some(slot::HOURS));
     let with_time = effect.terms.iter().any(|t| t.formula.variables().contains(&"t"));
-    if effect.id == first.effect && with_time && !jumps && !without_temperature(fit, seen).is_empty() {
+    if effect.id == first.effect && with_time && !effect.is_incident() && !without_temperature(fit, seen).is_empty() {
         first.or_else = Some("what goes with the room's temperature (this log carries none)".to_owned());
     }
 }
@@ -295,8 +293,8 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
     let Some((first, group)) = candidates.first_mut().filter(|c| c.proposed).zip(seen.groups.first()) else { return };
     let chosen = group.first();
     let effect = seen.named.effects[chosen];
-    let jumps = effect.parameters.iter().any(|p| p.between == Some(slot::HOURS));
-    let of_blocks = effect.id == first.effect && jumps && effect.terms.iter().all(|t| t.place == Place::Block);
+    let of_blocks =
+        effect.id == first.effect && effect.is_incident() && effect.terms.iter().all(|t| t.place == Place::Block);
     let Some(clock) = features.variables.iter().find(|v| v.kind == Kind::Time).filter(|_| of_blocks) else { return };
     let at_h = seen.named.library.candidates()[chosen].variants[seen.order.scores[chosen].variant].shape;
     let still: Vec<&Direction> = features.directions.iter().filter(|d| d.name.starts_with("machine-")).collect();

@@ -37,11 +37,12 @@ mod visit_scatter;
 
 use crate::design::Planned;
 use crate::diag::Result;
+use crate::fit::held_out::by_visit;
 use crate::fit::{Fit, Reason, Settings, VisitSource, declared_tau_mm, identify_beside, identify_data};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
 use crate::search::dependence::{Dependence, dependences};
-use crate::search::groups::Group;
+use crate::search::groups::{Group, Member};
 use crate::search::held_out::{Choice, HeldOut, held_out};
 use crate::search::pattern_tests::{Features, Generics};
 use crate::search::{LackOfFit, Library, Pair, Search, lack_of_fit};
@@ -144,6 +145,7 @@ pub fn examine<'a>(
     };
     let nested = search.held_out(&evidence.visits, Choice::Redone);
     let mut groups = order.groups(at_most);
+    groups.iter_mut().for_each(|group| without_idle_moments(group, named));
     let behind = borne_out_behind(&mut groups, &search, &evidence.visits, &nested);
     let given = behind.is_some();
     Examination {
@@ -159,6 +161,28 @@ pub fn examine<'a>(
         named,
         search,
     }
+}
+
+/// Where these touches cannot tell an incident from an effect that it includes and that always acts, only that one is named: an axis
+/// whose position was lost before the first touch has another zero position.
+fn without_idle_moments(group: &mut Group, named: &Named) {
+    let effect = |m: &Member| named.effects[m.candidate];
+    let leader = &named.effects[group.leader].id;
+    let always: Vec<&str> = group
+        .members
+        .iter()
+        .map(effect)
+        .filter(|e| !e.is_repeated() && !e.is_incident())
+        .map(|e| e.id.as_str())
+        .collect();
+    // a group says of each member that the leader adds nothing after it, and nothing of two others
+    let is_idle = |m: &Member| {
+        let includes = |id: &&str| effect(m).includes.iter().any(|other| other == id);
+        effect(m).is_incident()
+            && always.iter().filter(|id| includes(id)).any(|id| *leader == *id || *leader == effect(m).id)
+    };
+    let idle: Vec<usize> = group.members.iter().filter(|m| is_idle(m)).map(|m| m.candidate).collect();
+    group.members.retain(|m| !idle.contains(&m.candidate));
 }
 
 /// Where held-out touches do not bear out the first finding, one behind it that they do comes before it: of two effects that act
@@ -262,12 +286,13 @@ impl<'a> Tested<'a> {
         let mut decision = decide::decide(&seen, &beside);
         if let Some(pair) = pairs::both(subject, &seen, &decision, &generics) {
             pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most);
+            seen.groups.iter_mut().for_each(|group| without_idle_moments(group, named));
             (seen.both, seen.given) = (Some(pair), true);
             (beside.shapes_win, beside.better) = (false, None);
             decision = decide::Decision { kind: decide::Kind::MissingEffect, confirmed: true, named: true };
         }
         let refitted = match options.refit && decision.confirmed && fit.outcome.rms_um <= setup_mistakes::GROSS_UM {
-            true => Some(with_effects(subject, &seen.first_names())?),
+            true => Some(tried_with(subject, &seen.first_names())?),
             false => None,
         };
         if refitted.as_ref().is_some_and(|again| raises_the_error(fit, again)) {
@@ -319,7 +344,7 @@ impl<'a> Tested<'a> {
         {
             let again = match refitted {
                 Some(again) if first.proposed => again,
-                _ => with_effects(subject, &[first.effect.as_str()])?,
+                _ => tried_with(subject, &[first.effect.as_str()])?,
             };
             if first.proposed {
                 first.rms_after_um = again.outcome.rms_um;
@@ -368,12 +393,9 @@ fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagno
         held_out_rms_um: answer.held_out_rms_um,
     });
     // the model's own figures are those of the touches that it uses, as in every other answer
-    let features = Arc::new(features::features(subject.fit, machine));
-    let own = Regression::new(subject.fit, machine, catalogue, &features);
-    let own = folds::Folds::new(subject.fit, &own.evidence);
-    let held_out = own.model();
+    let held_out = by_visit(subject.fit);
     answer.rms_um = subject.fit.outcome.rms_um;
-    answer.held_out_rms_um = held_out.map(|h| h.rms_um);
+    answer.held_out_rms_um = held_out.as_ref().map(|h| h.rms_um);
     answer.held_out_se_um = held_out.and_then(|h| h.standard_error_um);
     answer.says = crate::words::diagnose::verdict(&answer, &fit);
     Ok(Some(answer))
@@ -391,11 +413,24 @@ fn explains(fit: &Fit, rms_um: f64) -> bool {
 /// # Errors
 /// When an effect is unknown.
 pub fn with_effects(subject: Subject, more: &[&str]) -> Result<Fit> {
+    let settings = settings_with(subject, more);
+    identify_data(subject.machine, subject.catalogue, subject.fit.data.clone(), &settings)
+}
+
+/// A trial of it: shapes of the model begin where the fit has them, and stay where it holds them.
+///
+/// # Errors
+/// When an effect is unknown.
+fn tried_with(subject: Subject, more: &[&str]) -> Result<Fit> {
+    identify_beside(subject.fit, subject.machine, subject.catalogue, &settings_with(subject, more))
+}
+
+fn settings_with(subject: Subject, more: &[&str]) -> Settings {
     let mut settings = subject.settings.clone();
     settings.effects.extend(more.iter().map(|e| (*e).to_owned()));
     settings.reference = Some(subject.fit.model.reference);
     settings.quick = true;
-    identify_beside(subject.fit, subject.machine, subject.catalogue, &settings)
+    settings
 }
 
 /// Does a fit still miss something, by the tests of the first step?

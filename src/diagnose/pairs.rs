@@ -1,7 +1,7 @@
 //! Two effects at once, before an effect of many parameters is named and before nothing is.
 
 use super::decide::{Decision, Kind, LACK_OF_FIT, bears_out};
-use super::{Examination, Subject, with_effects};
+use super::{Examination, Subject, tried_with};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, held_out};
 use crate::search::pattern_tests::Generics;
@@ -56,7 +56,7 @@ pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision, ge
 
 /// Does the noise explain what a fit with these effects leaves?
 fn is_left_to_the_noise(subject: Subject, effects: [&str; 2]) -> bool {
-    with_effects(subject, &effects).is_ok_and(|fit| fit.dof > 0 && fit.outcome.chi2_per_dof <= fit.noise.limit(fit.dof))
+    tried_with(subject, &effects).is_ok_and(|fit| fit.dof > 0 && fit.outcome.chi2_per_dof <= fit.noise.limit(fit.dof))
 }
 
 /// The groups with those of the pair in front.

@@ -157,7 +157,8 @@ impl LeftOut {
     /// What `model` leaves out.
     pub(super) fn new(model: &Model, machine: &Machine, catalogue: &Catalogue, data: &Data) -> Self {
         let mut effects = unmodelled_by(&model.unknowns, machine, catalogue);
-        effects.retain(|e| !e.is_repeated());
+        // an incident is a mistake that the diagnosis looks for, and no part of an uncertainty (GUM 3.4.7); its moment is unknown
+        effects.retain(|e| !e.is_repeated() && !e.is_incident());
         let (effects, without_value) = with_values(effects, &data.observations);
         let model = Model::new(machine, &effects, &data.set_ups, model.reference);
         Self { model, without_value }

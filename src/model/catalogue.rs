@@ -4,7 +4,7 @@ pub use super::as_written::About;
 use super::as_written::File;
 use super::check::Check;
 use super::for_each_axis::expand;
-use super::formula::Formula;
+use super::formula::{Formula, slot};
 pub use super::lever_arm::Arm;
 use super::surface::Body;
 use crate::axes::AxisName;
@@ -143,6 +143,12 @@ impl Effect {
     #[must_use]
     pub fn is_repeated(&self) -> bool {
         self.per_block || self.per_run
+    }
+
+    /// True when it happens at one moment: blocks that slipped, a position that was lost.
+    #[must_use]
+    pub fn is_incident(&self) -> bool {
+        self.parameters.iter().any(|p| p.between == Some(slot::HOURS))
     }
 
     /// True when no body has both: their parameters carry the names of their bodies.

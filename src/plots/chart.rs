@@ -96,33 +96,27 @@ pub enum Model {
 #[serde(tag = "mark", rename_all = "kebab-case")]
 pub enum Mark {
     Points {
-        /// Name.
         series: String,
         look: Look,
         points: Vec<Point>,
     },
     /// A line through points; a break where a value is not finite.
     Line {
-        /// Name.
         series: String,
         pen: Pen,
         points: Vec<Point>,
     },
     /// A filled rectangle; without ends as long as the axis. The numbers stand in the CSV where the series has a name.
     Area {
-        /// Name.
         series: String,
         ink: Ink,
         /// 0 (unseen) to 1.
         opacity: f64,
-        /// From, to.
         x: (f64, f64),
-        /// From, to.
         y: (f64, f64),
     },
     /// A line across the whole chart with its name.
     Rule {
-        /// Name.
         series: String,
         pen: Pen,
         at: f64,
@@ -136,10 +130,11 @@ pub enum Mark {
         at: (f64, f64),
     },
     /// A square of numbers from -1 to 1, row by row on axes of names.
-    Cells { rows: Vec<Vec<Option<f64>>> },
+    Cells {
+        rows: Vec<Vec<Option<f64>>>,
+    },
     /// The residual of each touch that is used, against the chart's variable.
     Touches {
-        /// Name.
         series: String,
         look: Look,
         /// Of the touches that show a displacement in this direction of R; none: of all, along their faces.
@@ -148,19 +143,23 @@ pub enum Mark {
     },
     /// What the model after has and the one before has not, against the chart's variable.
     Added {
-        /// Name.
         series: String,
         pen: Pen,
         /// As of the touches.
         direction: Option<usize>,
     },
     /// Lines in space, mm in R.
-    Wire { pen: Pen, lines: Vec<Vec<[f64; 3]>> },
+    Wire {
+        pen: Pen,
+        lines: Vec<Vec<[f64; 3]>>,
+    },
     /// A word in space, mm in R.
-    Name { text: String, at: [f64; 3] },
+    Name {
+        text: String,
+        at: [f64; 3],
+    },
     /// The residual of each touch of a stage as an arrow.
     Arrows {
-        /// Name.
         series: String,
         pen: Pen,
         /// Number of its word in the view's touches.
@@ -168,7 +167,6 @@ pub enum Mark {
     },
     /// The touches that are not used, in space.
     Unused {
-        /// Name.
         series: String,
         look: Look,
     },
@@ -286,6 +284,7 @@ fn nice(x: f64) -> f64 {
         }
 }
 
+/// A plot, on paper and on the page.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Chart {
     /// Name of its files.
@@ -293,9 +292,7 @@ pub struct Chart {
     pub title: String,
     /// For who cannot see it.
     pub says: String,
-    /// The axis below.
     pub x: Axis,
-    /// The axis at the left.
     pub y: Axis,
     /// The axis at the left counts from the top, as lists do.
     pub downwards: bool,

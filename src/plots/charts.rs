@@ -62,7 +62,7 @@ pub(super) fn minus(number: String) -> String {
 
 /// An error with three digits; as many unknowns as touches leave nothing but the computer's rounding.
 fn um(value: f64) -> String {
-    format!("{} µm", if value < 5e-4 { "0".to_owned() } else { minus(significant(value)) })
+    format!("{} µm", if value.abs() < 5e-4 { "0".to_owned() } else { minus(significant(value)) })
 }
 
 fn noise(view: &View, upright: bool) -> Mark {
@@ -144,7 +144,10 @@ fn results(view: &View) -> Chart {
     let at = |p: &ParameterRecord| p.at_radius_um.unwrap_or(0.0);
     let furthest = shown.iter().map(|p| at(p).abs() + doubt(p)).chain(shown.iter().filter_map(|p| p.tolerance_um));
     let reach = 1.08 * highest(furthest.chain([view.tolerance.error_um]));
-    let names: Vec<String> = shown.iter().map(|p| format!("{} ({})", p.says, p.name)).collect();
+    let mut names: Vec<String> = shown.iter().map(|p| format!("{} ({})", p.says, p.name)).collect();
+    if names.is_empty() {
+        names.push("no error can be determined".to_owned());
+    }
     let title = format!("error at {} mm, µm", view.tolerance.radius_mm);
     let x = Axis::new(format!("{title} (bar: 95 %)"), (-reach, reach)).or(&title);
     let partly = view.diagnosis.answer.verdict != Verdict::Adequate && view.proposed.is_empty();
@@ -154,19 +157,22 @@ fn results(view: &View) -> Chart {
         "The machine's errors against the tolerance"
     };
     let mut c = chart("results", title, x, Axis::named(names));
-    let each = shown.iter().map(|p| format!("{} {} ± {} ({})", p.name, um(at(p)), um(doubt(p)), p.judgement.says()));
+    let each = shown.iter().map(|p| {
+        let expanded = p.at_radius_expanded_um.map_or_else(String::new, |doubt| format!(" ± {}", um(doubt)));
+        format!("{} {}{expanded} ({})", p.name, um(at(p)), p.judgement.says())
+    });
     c.says = match &each.collect::<Vec<_>>()[..] {
         [] => "These touches determine no error of the machine.".to_owned(),
-        each => format!("{title}: {}.", each.join("; ")),
+        each => {
+            let t = &view.tolerance;
+            format!("{title} of {} µm at {} mm: {}.", t.error_um, t.radius_mm, each.join("; "))
+        }
     };
     c.downwards = true;
     c.aspect = (0.22 + 0.032 * shown.len() as f64).clamp(0.4, 1.1);
     for (i, t) in shown.iter().enumerate().filter_map(|(i, p)| Some((i as f64, p.tolerance_um?))) {
         let (series, x, y) = ("tolerance".to_owned(), (-t, t), (i - 0.5, i + 0.5));
         c.marks.push(Mark::Area { series, ink: Ink::Band, opacity: 1.0, x, y });
-    }
-    if shown.is_empty() {
-        c.marks.push(Mark::Word { text: "no error can be determined".to_owned(), at: (-0.5 * reach, -0.1) });
     }
     let now = shown.iter().enumerate().filter_map(|(i, p)| {
         let now = view.parameters.iter().find(|q| q.name == p.name && !view.proposed.is_empty())?;
@@ -192,8 +198,10 @@ fn results(view: &View) -> Chart {
         let of = |(i, p): (usize, &&ParameterRecord)| {
             let value = with_unit(&minus(digits(p.value, p.sigma)), &p.unit);
             let note = match p.expanded {
-                Some(expanded) => format!("{}: {value} ± {} (95 %)", p.name, minus(digits(expanded, p.sigma))),
-                None => format!("{}: {value}", p.name),
+                Some(expanded) => {
+                    format!("{}: {value} ± {} (95 %); at the radius:", p.name, minus(digits(expanded, p.sigma)))
+                }
+                None => format!("{}: {value}; at the radius:", p.name),
             };
             (p.judgement == judgement).then(|| point(at(p), i as f64, note))
         };
@@ -304,11 +312,10 @@ fn residuals(view: &View, variable: &Variable) -> Chart {
     let name = format!("residual-{}", variable.id.to_lowercase());
     let y = Axis::new(title, (-reach, reach)).or("residual, µm");
     let mut c = chart(&name, format!("Residual against the {}", variable.title), x, y);
-    let label = |rung: usize| view.ladder.get(rung).map_or("", |r| r.label.as_str());
     let share = variable
         .share
         .map_or_else(String::new, |share| format!(" {:.0} % of the unexplained error depends on it.", 100.0 * share));
-    c.says = format!("Residuals in µm against {}: {} and {}.{share}", variable.title, label(from), label(to));
+    c.says = format!("Residuals in µm against {}.{share}", variable.title);
     c.marks.push(Mark::Area {
         series: "twice the noise".to_owned(),
         ink: Ink::Band,

@@ -40,6 +40,8 @@ fn plain(mark: &Mark, chart: &Chart, view: &View) -> Vec<Mark> {
             vec![Mark::Area { series: series.clone(), ink: *ink, opacity: *opacity, x, y }]
         }
         Mark::Cells { rows } => cells(rows),
+        // one model is not drawn twice
+        Mark::Touches { model: Model::Before, .. } if view.errors.before == view.errors.after => Vec::new(),
         Mark::Touches { series, look, direction, model } => {
             let variable = chart.x.variable.as_deref().unwrap_or_default();
             let of = |i: usize| direction.is_none_or(|d| t.towards[i] == d);

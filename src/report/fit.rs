@@ -210,7 +210,7 @@ fn legend(results: &[&Parameter], shown: &dyn Fn(&str) -> bool) -> String {
         out += "std. unc.: standard uncertainty with everything that the fit counts\n";
     }
     if shown("unmodelled") && results.iter().any(|p| p.sigma_with_unmodelled.is_some()) {
-        out += "unmodelled: standard uncertainty if every effect outside the model has its usual size\n";
+        out += "unmodelled: standard uncertainty if every lasting effect outside the model has its usual size\n";
     }
     out
 }

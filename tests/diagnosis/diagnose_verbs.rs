@@ -226,13 +226,19 @@ fn a_mistake_is_named_where_most_touches_miss() {
     }
 }
 
-/// Everything moves by 7 um at one moment, in two directions: a warm-up, a slipped block and a drift follow it a part of the
-/// way each, and none of them is it.
+/// Everything moves by 7 um at one moment, in three directions: a warm-up, a slipped block, a drift and two lost positions follow it
+/// a part of the way each, and none of them is it. In two directions it is two lost positions.
 #[test]
 fn a_step_in_time_gets_no_name_and_solve_leaves_the_study_alone() {
-    let own = "[[effect]]\nid = \"planted\"\nat = \"base\"\nterms = [\n{ parameter = \"qx\", unit = \"um\", dof = \"dx\", formula = \"step(t - 1.02)\" },\n{ parameter = \"qz\", unit = \"um\", dof = \"dz\", formula = \"step(t - 1.02)\" } ]\n";
-    let wrong =
-        "effects_file = \"own.toml\"\nseed = 8\n[effects.planted]\nqx = 7.0\nqz = -7.0\n[noise]\ntouch_um = 1.0\n";
+    let own = "[[effect]]\nid = \"planted\"\nat = \"base\"\nterms = [\n{ parameter = \"qx\", unit = \"um\", dof = \"dx\", formula = \"step(t - 1.02)\" },\n{ parameter = \"qy\", unit = \"um\", dof = \"dy\", formula = \"step(t - 1.02)\" },\n{ parameter = \"qz\", unit = \"um\", dof = \"dz\", formula = \"step(t - 1.02)\" } ]\n";
+    let wrong = "effects_file = \"own.toml\"\nseed = 8\n[effects.planted]\nqx = 7.0\nqy = 7.0\nqz = -7.0\n[noise]\ntouch_um = 1.0\n";
+    let two = folder(&["full"], &wrong.replace("qy = 7.0", "qy = 0.0"), Some(own));
+    let (d, _) = json(two.path(), &["diagnose", "study.toml"]);
+    let named: Vec<&str> = (0..2).map(|i| d["candidates"][i]["effect"].as_str().unwrap()).collect();
+    assert_eq!(
+        (d["verdict"].as_str(), &named[..]),
+        (Some("missing-effect"), &["lost-position-z", "lost-position-x"][..])
+    );
     let folder = folder(&["full"], wrong, Some(own));
     let at = folder.path();
     let (d, code) = json(at, &["diagnose", "study.toml"]);

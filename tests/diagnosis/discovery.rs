@@ -128,13 +128,18 @@ fn what_chance_does_not_make_is_not_called_faint() {
 /// An effect of which only some parameters act is no less that effect, and a jump may come in mid-visit.
 #[test]
 fn an_effect_of_the_catalogue_that_acts_in_a_part_of_its_parameters_is_named() {
-    for (hour, size) in [(0.5, [8.0, -5.0, 0.0]), (0.7, [8.0, -5.0, 0.0]), (0.7, [0.0, 0.0, 8.0])] {
+    for (hour, size) in [(0.5, [8.0, -5.0, 0.0]), (0.7, [8.0, -5.0, 0.0]), (0.7, [8.0, 0.0, 0.0])] {
         let [dx, dy, dz] = size;
         let wrong = format!("[effects.block-slip]\ndx = {dx:?}\ndy = {dy:?}\ndz = {dz:?}\nfrom_h = {hour:?}\n");
         let (_, _, d) = said(&Bench::full(), &wrong, "", "");
         assert!(matches!(d.verdict, Verdict::MissingEffect(_)), "{hour} {size:?}: {}", d.says);
         assert_eq!(d.candidates[0].effect, "block-slip", "{hour} {size:?}: {}", d.says);
     }
+    // along C's line a Z that lost its position does the same, with one parameter
+    let (_, _, d) = said(&Bench::full(), "[effects.block-slip]\ndx = 0.0\ndy = 0.0\ndz = 8.0\nfrom_h = 0.7\n", "", "");
+    let first = &d.candidates[0];
+    assert_eq!((d.verdict.is_missing_effect(), first.effect.as_str()), (true, "lost-position-z"), "{}", d.says);
+    assert!(first.same_as.iter().any(|e| e == "block-slip"), "{:?}", first.same_as);
     // the set-up of blocks left out of a model of blocks that stand 0.1 mm and a milliradian off
     let (_, _, d) = said(&Bench::full(), "", "", "block-setup");
     assert_eq!((d.verdict.is_missing_effect(), d.candidates[0].effect.as_str()), (true, "block-setup"), "{}", d.says);

@@ -95,6 +95,29 @@ fn an_axis_that_was_homed_again_is_named() {
     assert!((size.value - 0.03).abs() < 0.003, "{}", size.value);
 }
 
+/// From the middle of the measurement on an axis of the table and one of the head stand elsewhere than the control believes.
+#[test]
+fn an_axis_that_lost_its_position_is_named_with_its_moment() {
+    for (machine, axis, off, effect) in [
+        ("trunnion", 0, 0.012, "lost-position-x"),
+        ("trunnion", 5, 1.2e-4, "lost-position-c"),
+        ("swivel-head", 1, -0.012, "lost-position-y"),
+        ("swivel-head", 4, 1.2e-4, "lost-position-b"),
+    ] {
+        let bench = Bench::of(machine, true);
+        let slipped = move |at: &At, wrong: &mut forward::Wrong| {
+            wrong.joint[axis] += if at.hours > 0.5 * at.hours_of_all { off } else { 0.0 };
+        };
+        let d = judge::diagnosis(&bench, &[&slipped], 7);
+        assert!(d.verdict.is_missing_effect(), "{machine} {effect}: {}", d.says);
+        let first = &d.candidates[0];
+        assert_eq!(first.effect, effect, "{machine}: {}", d.says);
+        let lost = first.parameters.iter().find(|p| p.name.starts_with("lost_") && !p.name.contains("_h_")).unwrap();
+        let unit = if axis < 3 { 1e3 } else { 1e6 };
+        assert!((lost.value / unit - off).abs() < 0.2 * off.abs(), "{machine} {effect}: {} {}", lost.value, lost.unit);
+    }
+}
+
 #[test]
 fn hidden_faults_are_in_the_first_groups() {
     let benches: Vec<Bench> = [true, false].into_iter().flat_map(Bench::all).collect();

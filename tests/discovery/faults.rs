@@ -47,7 +47,7 @@ pub type Draw = fn(&Bench, &mut ChaCha8Rng) -> Option<Fault>;
 
 /// All families.
 pub fn families() -> Vec<Draw> {
-    let axes: [Draw; 20] = [
+    let axes: [Draw; 21] = [
         wobble,
         wobble,
         run_out,
@@ -58,6 +58,7 @@ pub fn families() -> Vec<Draw> {
         wind_up,
         clamp,
         homed_again,
+        lost_position,
         ring_and_bearing,
         screw_scale,
         warm_end,
@@ -226,6 +227,20 @@ fn homed_again(bench: &Bench, rng: &mut ChaCha8Rng) -> Option<Fault> {
     let expects = [format!("rehomed-{}", small(name))];
     Some(Fault::new(format!("{name} homed again between the runs"), &[&expects[0]], move |at, size, wrong| {
         wrong.joint[name.index()] += TURN * size * at.run as f64;
+    }))
+}
+
+/// A coupling slips at some moment.
+fn lost_position(bench: &Bench, rng: &mut ChaCha8Rng) -> Option<Fault> {
+    let rotary = rng.random_bool(0.5);
+    let name = pick(bench, rotary, rng).name;
+    let share = rng.random_range(0.15..0.85);
+    let off = if rotary { TURN } else { UM };
+    let expects = [format!("lost-position-{}", small(name))];
+    Some(Fault::new(format!("{name} that lost its position"), &[&expects[0]], move |at, size, wrong| {
+        if at.hours > share * at.hours_of_all {
+            wrong.joint[name.index()] += 4.0 * off * size;
+        }
     }))
 }
 

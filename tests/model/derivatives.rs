@@ -66,8 +66,10 @@ terms = [
 const SIGMA_MM: f64 = 1e-3;
 
 /// Parameters without a derivative, each with the reason.
-const WITHOUT_DERIVATIVE: [(&str, &str, &str); 1] =
-    [("block-slip", "from_h", "a step in time has no slope: the hour is found by trying (scan)")];
+const WITHOUT_DERIVATIVE: [(&str, &str, &str); 2] = [
+    ("block-slip", "from_h", "a step in time has no slope: the hour is found by trying (scan)"),
+    ("lost-position-", "lost_h_", "as above, for each axis"),
+];
 
 fn random_touch(machine: &Machine, carriers: &[Carrier], rng: &mut ChaCha8Rng) -> Observation {
     let mut position = Position::default();
@@ -162,7 +164,9 @@ fn analytic_derivatives_agree_with_central_differences_for_every_effect_and_mach
                     .collect();
                 model.gap_and_row(&touch, &theta, &mut row);
                 for j in 0..theta.len() {
-                    let step = if stands_inside(&model, j) { 1e-5 } else { 1e-4 } * model.unknowns[j].typical;
+                    // a swapped sign moves a touch by metres: what a central difference leaves is of third order
+                    let small = stands_inside(&model, j) || effect.discrete;
+                    let step = if small { 1e-5 } else { 1e-4 } * model.unknowns[j].typical;
                     let mut at = theta.clone();
                     at[j] += step;
                     let plus = model.gap(&touch, &at) / SIGMA_MM;
@@ -193,7 +197,7 @@ fn analytic_derivatives_agree_with_central_differences_for_every_effect_and_mach
         }
     }
     for ((effect, name), most) in &slopes {
-        let excused = WITHOUT_DERIVATIVE.iter().any(|(e, p, _)| *e == effect.as_str() && *p == name.as_str());
+        let excused = WITHOUT_DERIVATIVE.iter().any(|(e, p, _)| effect.starts_with(e) && name.starts_with(p));
         assert!(*most > 0.0 || excused, "{effect} {name} never has a derivative");
     }
     assert!(n_checked > 10_000, "{n_checked}");

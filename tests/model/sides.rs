@@ -238,6 +238,26 @@ fn the_new_rows_by_hand() {
     check_last(&table, &back, "windup-c", &wound, "", 0.000_393_469);
 }
 
+/// An axis loses its position by +10 µm, C by +40 µrad, 3.6 s after the first touch; the second comes after 10 s.
+#[test]
+fn an_axis_is_elsewhere_from_some_moment_on() {
+    for machine in [table(), head()] {
+        let face = || Touch::of_c([50.0, 0.0, -202.684], X, 0.0);
+        let x = [("lost_X", 10.0), ("lost_h_X", 0.001)];
+        // before it nothing has happened
+        check(&machine, face(), "lost-position-x", &x, "", 0.0);
+        // then the ball is 10 µm further over +X than X says, on either side of the chain, and meets the face at a smaller X
+        check_last(&machine, &[face(), face()], "lost-position-x", &x, "", -0.010);
+        // a face that looks along Y does not see it
+        let aside = || Touch::of_c([50.0, 0.0, -202.684], Y, 0.0);
+        check_last(&machine, &[aside(), aside()], "lost-position-x", &x, "", 0.0);
+        // C carries the face +Y, 50 mm out, on by 50 * 40e-6 = 0.002, towards the ball
+        let c = [("lost_C", 40.0), ("lost_h_C", 0.001)];
+        check(&machine, aside(), "lost-position-c", &c, "", 0.0);
+        check_last(&machine, &[aside(), aside()], "lost-position-c", &c, "", 0.002);
+    }
+}
+
 /// C was homed again before the second run, 1 mrad further: the first run is as it was; in the second the face +Y of a block 50 mm
 /// out has gone on by 50 * tan(1 mrad) = 0.050 000 017, and its plane, 8 mm from the line through C, is met 8 * 5e-7 further out.
 #[test]

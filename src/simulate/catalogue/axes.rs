@@ -5,7 +5,7 @@
 //! before the axis's motion (it does not turn with it), on the axis's own line and in the axis's own frame; for linear
 //! axes after, in R (lever arms are counted in the frame that moves). Polynomials are scaled to [`SPAN_MM`].
 
-use super::unit::Unit::{Deg, Mm, One, Um, UmPerM, Urad};
+use super::unit::Unit::{Deg, H, Mm, One, Um, UmPerM, Urad};
 use super::{Parameter, Refusal, Role, Settings, across, along, axis_here, axis_of, dof_letter};
 use crate::axes::AxisName;
 use crate::machine::{Machine, Side};
@@ -35,14 +35,22 @@ pub fn ids(_: &Machine) -> Vec<String> {
         out.extend([format!("scale-{l}"), format!("positioning-{l}-2"), format!("pitch-{l}"), format!("backlash-{l}")]);
         out.extend(LINEAR.into_iter().filter(|&d| d != l).map(|d| format!("straightness-{d}{l}")));
         out.extend(ROTARY.map(|d| format!("angular-{d}{l}")));
+        out.push(format!("lost-position-{l}"));
     }
     for r in ROTARY {
         for family in ["radial", "axial", "tilt", "positioning"] {
             out.extend((1..=3).map(|k| format!("{family}-{r}-{k}")));
         }
         out.extend(
-            ["positioning-{r}-linear", "backlash-{r}", "windup-{r}", "encoder-eccentricity-{r}", "rehomed-{r}"]
-                .map(|id| id.replace("{r}", &r.to_string())),
+            [
+                "positioning-{r}-linear",
+                "backlash-{r}",
+                "windup-{r}",
+                "encoder-eccentricity-{r}",
+                "rehomed-{r}",
+                "lost-position-{r}",
+            ]
+            .map(|id| id.replace("{r}", &r.to_string())),
         );
     }
     out.extend(
@@ -58,6 +66,9 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
     }
     if let Some(found) = axis_of(id, "backlash", machine) {
         return Ok(vec![backlash(found?.1)]);
+    }
+    if let Some(found) = axis_of(id, "lost-position", machine) {
+        return lost_position(found?.1, settings);
     }
     for (prefix, of) in [
         ("windup", wind_up as fn(AxisName, Settings<'_>) -> Vec<Parameter>),
@@ -344,6 +355,17 @@ fn run_out_that_is_read(axis: AxisName, settings: Settings<'_>) -> Vec<Parameter
 fn homed_again(axis: AxisName, _: Settings<'_>) -> Vec<Parameter> {
     let zero = Target::OwnLine { axis, after: false, dof: along(axis) + 3 };
     vec![Parameter::at(format!("rehomed_{axis}"), Deg, zero, Shape::Constant)]
+}
+
+/// A coupling slips at some hour: from then on the axis is elsewhere by one amount.
+fn lost_position(axis: AxisName, settings: Settings<'_>) -> Result<Vec<Parameter>, Refusal> {
+    let when = format!("lost_h_{axis}");
+    let Some(hour) = settings(&when).or_else(|| settings("from_h")) else {
+        return Err(Refusal::NotHere(format!("it must say when: {when} (hours)")));
+    };
+    let unit = if axis.is_rotary() { Urad } else { Um };
+    let lost = Parameter::new(format!("lost_{axis}"), unit, [(Target::Reading(axis), Shape::FromHour(hour), 1.0)]);
+    Ok(vec![lost, Parameter::setting(&when, H).alias("from_h")])
 }
 
 /// The control counts this axis the wrong way round (value 1).
