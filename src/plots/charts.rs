@@ -196,7 +196,7 @@ fn results(view: &View) -> Chart {
         (Judgement::None, Ink::Muted, Shape::Cross),
     ] {
         let of = |(i, p): (usize, &&ParameterRecord)| {
-            let value = with_unit(&minus(digits(p.value, p.sigma)), &p.unit);
+            let value = with_unit(minus(digits(p.value, p.sigma)), &p.unit);
             let note = match p.expanded {
                 Some(expanded) => {
                     format!("{}: {value} ± {} (95 %); at the radius:", p.name, minus(digits(expanded, p.sigma)))

@@ -166,7 +166,7 @@ fn draw<DB: DrawingBackend>(root: &DrawingArea<DB, Shift>, chart: &Chart) -> Dra
     }
     root.draw(&Text::new(chart.title.clone(), (20, 16), letters(20.0, HPos::Left, VPos::Top)))?;
     draw_legend(root, &legend)?;
-    if !chart.picture.is_some() {
+    if chart.picture.is_none() {
         axes(root, &frame)?;
     }
     for mark in &chart.marks {
