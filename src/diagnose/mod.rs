@@ -145,7 +145,7 @@ pub fn examine<'a>(
     };
     let nested = search.held_out(&evidence.visits, Choice::Redone);
     let mut groups = order.groups(at_most);
-    groups.iter_mut().for_each(|group| without_idle_moments(group, named));
+    groups.iter_mut().for_each(|group| without_needless_incidents(group, named));
     let behind = borne_out_behind(&mut groups, &search, &evidence.visits, &nested);
     let given = behind.is_some();
     Examination {
@@ -165,7 +165,7 @@ pub fn examine<'a>(
 
 /// Where these touches cannot tell an incident from an effect that it includes and that always acts, only that one is named: an axis
 /// whose position was lost before the first touch has another zero position.
-fn without_idle_moments(group: &mut Group, named: &Named) {
+fn without_needless_incidents(group: &mut Group, named: &Named) {
     let effect = |m: &Member| named.effects[m.candidate];
     let leader = &named.effects[group.leader].id;
     let always: Vec<&str> = group
@@ -176,13 +176,13 @@ fn without_idle_moments(group: &mut Group, named: &Named) {
         .map(|e| e.id.as_str())
         .collect();
     // a group says of each member that the leader adds nothing after it, and nothing of two others
-    let is_idle = |m: &Member| {
+    let is_needless = |m: &Member| {
         let includes = |id: &&str| effect(m).includes.iter().any(|other| other == id);
         effect(m).is_incident()
             && always.iter().filter(|id| includes(id)).any(|id| *leader == *id || *leader == effect(m).id)
     };
-    let idle: Vec<usize> = group.members.iter().filter(|m| is_idle(m)).map(|m| m.candidate).collect();
-    group.members.retain(|m| !idle.contains(&m.candidate));
+    let needless: Vec<usize> = group.members.iter().filter(|m| is_needless(m)).map(|m| m.candidate).collect();
+    group.members.retain(|m| !needless.contains(&m.candidate));
 }
 
 /// Where held-out touches do not bear out the first finding, one behind it that they do comes before it: of two effects that act
@@ -286,7 +286,7 @@ impl<'a> Tested<'a> {
         let mut decision = decide::decide(&seen, &beside);
         if let Some(pair) = pairs::both(subject, &seen, &decision, &generics) {
             pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most);
-            seen.groups.iter_mut().for_each(|group| without_idle_moments(group, named));
+            seen.groups.iter_mut().for_each(|group| without_needless_incidents(group, named));
             (seen.both, seen.given) = (Some(pair), true);
             (beside.shapes_win, beside.better) = (false, None);
             decision = decide::Decision { kind: decide::Kind::MissingEffect, confirmed: true, named: true };
