@@ -52,7 +52,8 @@ pub(super) fn put_together(
         decided = Decided::MissingEffect;
         candidates.push(candidate);
     }
-    if decided != Decided::TooFewTouches {
+    let is_listed = options.lists() || decision.confirmed;
+    if decided != Decided::TooFewTouches && is_listed {
         let first_order = FirstOrder::from_fit(fit);
         let tell_apart = separating_touches::words(subject, seen, options);
         candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, told))| Candidate {
@@ -61,7 +62,7 @@ pub(super) fn put_together(
             ..candidate(fit, seen, &first_order, group, (i == 0, decision.confirmed))
         }));
     }
-    candidates.truncate(options.at_most);
+    candidates.truncate(options.at_most.max(1));
     super::turning_points::say(subject, &mut candidates);
     let found: Vec<&Group> = seen
         .groups
@@ -151,7 +152,7 @@ pub(super) fn put_together(
     // as the splits of `compare` and the sentences count: of what the noise does not explain
     let gross_first = usize::from(candidates.first().is_some_and(|c| c.effect == setup_mistakes::EFFECT));
     for (c, group) in candidates.iter_mut().skip(gross_first).zip(&seen.groups) {
-        c.share = beyond_the_noise(seen.evidence, c.share, seen.order.scores[group.first()].n_parameters);
+        c.share = beyond_the_noise(seen.evidence, c.share, seen.order().scores[group.first()].n_parameters);
     }
     // the curve is of what is named first
     let drawn = significant().find(|d| depends.first().is_some_and(|w| w.by == by(&d.on)));
@@ -219,6 +220,7 @@ pub(super) fn put_together(
         sketchable,
     };
     let verdict = findings.verdict(decided);
+    let model = if options.lists() { seen.folds(fit).model() } else { None };
     jump_of_what(seen, features, &mut candidates);
     let needs_temperature = without_temperature(fit, seen);
     room_or_time(fit, seen, &mut candidates);
@@ -229,8 +231,8 @@ pub(super) fn put_together(
         consequences: Vec::new(),
         oversized: Vec::new(),
         rms_um: fit.outcome.rms_um,
-        held_out_rms_um: seen.folds.model().map(|h| h.rms_um),
-        held_out_se_um: seen.folds.model().and_then(|h| h.standard_error_um),
+        held_out_rms_um: model.map(|h| h.rms_um),
+        held_out_se_um: model.and_then(|h| h.standard_error_um),
         all_touches: None,
         noise_um: noise_um(fit),
         visit_um: um_from_mm(seen.evidence.tau_mm),
@@ -296,13 +298,13 @@ fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candi
     let of_blocks =
         effect.id == first.effect && effect.is_incident() && effect.terms.iter().all(|t| t.place == Place::Block);
     let Some(clock) = features.variables.iter().find(|v| v.kind == Kind::Time).filter(|_| of_blocks) else { return };
-    let at_h = seen.named.library.candidates()[chosen].variants[seen.order.scores[chosen].variant].shape;
+    let at_h = seen.named.library.candidates()[chosen].variants[seen.order().scores[chosen].variant].shape;
     let still: Vec<&Direction> = features.directions.iter().filter(|d| d.name.starts_with("machine-")).collect();
     let n = features.block.len();
     let after = |i: usize| f64::from(u8::from(clock.values[i] >= at_h));
     let raw_mm = DMatrix::from_fn(n, still.len(), |i, d| mm_from_um(still[d].weight[i] * after(i)));
     let columns = seen.evidence.whiten(raw_mm);
-    if super::effects_versus_patterns::as_well(seen.evidence.question(), &seen.order.columns(chosen), &columns) {
+    if super::effects_versus_patterns::as_well(seen.evidence.question(), &seen.order().columns(chosen), &columns) {
         first.or_else = Some("the probe or the machine itself jumped".to_owned());
     }
 }
@@ -413,19 +415,19 @@ fn candidate(
 ) -> Candidate {
     let chosen = group.first();
     // sizes and what is left come from the order, probabilities from the tests
-    let score = &seen.order.scores[chosen];
+    let score = &seen.order().scores[chosen];
     let tests = || group.members.iter().map(|m| &seen.search.scores[m.candidate]);
     let p = tests().map(|s| s.p).fold(1.0, f64::min);
     // two effects that are named together pass their test together
     let both = seen.both.filter(|_| first);
     let p_adjusted = tests().map(|s| s.p_adjusted).chain(both.map(|b| b.p_adjusted)).fold(1.0, f64::min);
     let effect = seen.named.effects[chosen];
-    let held = if first && seen.search.leader().is_some() && both.is_none() {
-        seen.folds.chosen(seen.evidence, seen.named, &seen.nested)
-    } else {
-        seen.folds.given(seen.evidence, seen.named, chosen)
+    let folds = seen.folds(fit);
+    let held = match seen.nested.as_ref().filter(|_| first && both.is_none()) {
+        Some(nested) => folds.chosen(seen.evidence, seen.named, nested),
+        None => folds.given(seen.evidence, seen.named, chosen),
     };
-    let errors = seen.folds.errors(&held);
+    let errors = folds.errors(&held);
     let told = told(&score.covariance);
     // an order that leaves out the scatter of visits says nothing of the doubt: that is with it
     let tested = &seen.search.scores[chosen];
@@ -467,7 +469,7 @@ fn candidate(
     }
     let raw_um = seen.raw_um(chosen);
     let moves = moves(seen, score, &raw_um);
-    let question = seen.order.question;
+    let question = seen.order().question;
     let total = question.base.project(question.residual).norm_squared().max(f64::MIN_POSITIVE);
     let raw_mm = raw_um.map(mm_from_um);
     Candidate {
@@ -481,7 +483,7 @@ fn candidate(
         held_out_before_um: errors.before_um,
         held_out_after_um: errors.after_um,
         held_out_se_um: errors.fall_se_um,
-        nested: first && seen.search.leader().is_some() && !seen.given,
+        nested: first && seen.nested.is_some() && !seen.given,
         parameters,
         not_told,
         moves_um: moves.map(|m| m.0),

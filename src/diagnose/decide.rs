@@ -68,9 +68,9 @@ pub(super) fn decide(seen: &Examination, beside: &OtherEvidence) -> Decision {
     if seen.evidence.dof() < LEAST_DOF || !testable {
         return Decision { kind: Kind::TooFewTouches, confirmed: false, named: false };
     }
-    let named = seen.search.leader().is_some();
+    let named = seen.nested.is_some();
     let generic = seen.dependences.iter().any(|d| d.p_adjusted < FAMILY_LEVEL);
-    let confirmed = named && bears_out(&seen.nested) && !beside.shapes_win;
+    let confirmed = seen.nested.as_ref().is_some_and(bears_out) && !beside.shapes_win;
     let other = beside.gathered.is_some() || beside.scatter.is_some();
     let kind = if confirmed {
         Kind::MissingEffect

@@ -45,14 +45,14 @@ use crate::search::dependence::{Dependence, dependences};
 use crate::search::groups::{Group, Member};
 use crate::search::held_out::{Choice, HeldOut, held_out};
 use crate::search::pattern_tests::{Features, Generics};
-use crate::search::{LackOfFit, Library, Pair, Search, lack_of_fit};
+use crate::search::{LackOfFit, Pair, Search, lack_of_fit};
 use crate::units::um_from_mm;
 pub use answer::Diagnosis;
 use candidate_effects::Named;
 use evidence::Evidence;
 pub use first_order::taken_away_um;
 use nalgebra::DMatrix;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 pub use verdict::Verdict;
 use visit_scatter::Regression;
 
@@ -70,7 +70,8 @@ pub struct Subject<'a> {
 /// How much is worked out.
 #[derive(Debug, Clone, Copy)]
 pub struct Options<'a> {
-    /// Most candidates that are listed.
+    /// Most candidates that are listed. 0: what goes with the effects that are not named is left out, for who asks on what the
+    /// residual depends.
     pub at_most: usize,
     /// Refit with the first candidate: what remains, and which outliers come back.
     pub refit: bool,
@@ -87,6 +88,13 @@ impl Default for Options<'_> {
     }
 }
 
+impl Options<'_> {
+    /// Are effects listed that are not named?
+    fn lists(&self) -> bool {
+        self.at_most > 0
+    }
+}
+
 /// Everything that the answer is made from.
 pub struct Examination<'a> {
     /// The regression.
@@ -95,28 +103,37 @@ pub struct Examination<'a> {
     pub named: &'a Named<'a>,
     /// Their tests.
     pub search: Search<'a>,
-    /// The same for sizes and order: where no test passes, with the scatter that is left with the most likely effect.
-    pub order: Search<'a>,
-    /// What these touches cannot tell apart, best first.
+    /// The same for sizes and order, where no test passes: with the scatter that is left with the most likely effect.
+    ordered: Option<Search<'a>>,
+    /// What these touches cannot tell apart, best first; nothing where no test passes and none are listed.
     pub groups: Vec<Group>,
     /// On what the misfit depends, best first.
     pub dependences: Vec<Dependence>,
     /// Against pure error.
     pub lack_of_fit: LackOfFit,
-    /// The choice redone without the touches that judge it ...
-    pub nested: HeldOut,
+    /// Where a test passes: the choice redone without the touches that judge it ...
+    pub nested: Option<HeldOut>,
     /// ... or, where that bears nothing out, the first finding behind it that held-out touches bear out by itself.
     pub given: bool,
     /// Two effects that are named together.
     pub both: Option<Pair>,
-    /// What cross-validated errors are worked out from.
-    pub folds: folds::Folds,
+    folds: OnceLock<folds::Folds>,
 }
 
-impl Examination<'_> {
+impl<'a> Examination<'a> {
+    /// The tests that sizes and order are of.
+    fn order(&self) -> &Search<'a> {
+        self.ordered.as_ref().unwrap_or(&self.search)
+    }
+
+    /// What cross-validated errors are worked out from.
+    fn folds(&self, fit: &Fit) -> &folds::Folds {
+        self.folds.get_or_init(|| folds::Folds::new(fit, self.evidence))
+    }
+
     /// What the sizes of a candidate do before whitening, µm per typical size, with the shape that fits best.
     fn raw_um(&self, candidate: usize) -> DMatrix<f64> {
-        self.named.raw_um(&[(candidate, self.order.scores[candidate].variant)]).remove(0)
+        self.named.raw_um(&[(candidate, self.order().scores[candidate].variant)]).remove(0)
     }
 
     /// Ids of the effect that is named first, or of the two that are named together.
@@ -127,36 +144,27 @@ impl Examination<'_> {
 }
 
 /// The tests of a fit without the answer in words.
-#[must_use]
-pub fn examine<'a>(
-    fit: &Fit,
-    evidence: &'a Evidence,
-    named: &'a Named<'a>,
-    ordered: Option<&'a (Evidence, Library)>,
-    features: &Features,
-    generics: &Generics,
-    at_most: usize,
-) -> Examination<'a> {
+fn examine<'a>(fit: &Fit, found: &'a Regression<'a>, features: &Features, options: &Options) -> Examination<'a> {
+    let Regression { evidence, named, generics, .. } = found;
     let question = evidence.question();
-    let search = Search::new(question, &named.library);
-    let order = match ordered.filter(|_| search.leader().is_none()) {
-        Some((evidence, library)) => Search::new(evidence.question(), library),
-        None => search.clone(),
-    };
-    let nested = search.held_out(&evidence.visits, Choice::Redone);
-    let mut groups = order.groups(at_most);
+    let (search, dependences) =
+        rayon::join(|| Search::new(question, &named.library), || dependences(question, features, generics));
+    let passes = search.leader().is_some();
+    let ordered = if options.lists() && !passes { found.search_for_order(fit) } else { None };
+    let order = ordered.as_ref().unwrap_or(&search);
+    let mut groups = if options.lists() || passes { order.groups(options.at_most.max(1)) } else { Vec::new() };
+    let nested = passes.then(|| search.held_out(&evidence.visits, Choice::Redone));
     groups.iter_mut().for_each(|group| without_needless_incidents(group, named));
-    let behind = borne_out_behind(&mut groups, &search, &evidence.visits, &nested);
-    let given = behind.is_some();
+    let behind = nested.as_ref().and_then(|nested| borne_out_behind(&mut groups, &search, &evidence.visits, nested));
     Examination {
         groups,
-        order,
-        dependences: dependences(question, features, generics),
+        ordered,
+        dependences,
         lack_of_fit: lack_of_fit(&question),
-        nested: behind.unwrap_or(nested),
-        given,
+        given: behind.is_some(),
+        nested: behind.or(nested),
         both: None,
-        folds: folds::Folds::new(fit, evidence),
+        folds: OnceLock::new(),
         evidence,
         named,
         search,
@@ -190,7 +198,7 @@ fn without_needless_incidents(group: &mut Group, named: &Named) {
 fn borne_out_behind(groups: &mut [Group], search: &Search, visits: &[usize], nested: &HeldOut) -> Option<HeldOut> {
     /// What comes second by chance is never as sure.
     const SURE: f64 = 1e-4;
-    if search.leader().is_none() || decide::bears_out(nested) {
+    if decide::bears_out(nested) {
         return None;
     }
     for place in 1..groups.len() {
@@ -252,7 +260,7 @@ struct Tested<'a> {
     subject: Subject<'a>,
     features: &'a Arc<Features>,
     options: &'a Options<'a>,
-    generics: Generics,
+    generics: &'a Generics,
     seen: Examination<'a>,
     beside: decide::OtherEvidence,
     decision: decide::Decision,
@@ -267,13 +275,10 @@ impl<'a> Tested<'a> {
         options: &'a Options<'a>,
     ) -> Result<Self> {
         let Subject { machine, fit, .. } = subject;
-        let Regression { evidence, named, ordered } = found;
-        let generics = features::shapes(evidence, features);
-        let mut seen = examine(fit, evidence, named, ordered.as_ref(), features, &generics, options.at_most);
-        let weighed = match seen.groups.first().filter(|_| seen.search.leader().is_some()) {
-            Some(group) => {
-                effects_versus_patterns::weigh(evidence.question(), &named.library, &generics, group.first())
-            }
+        let Regression { evidence, named, generics, .. } = found;
+        let mut seen = examine(fit, found, features, options);
+        let weighed = match seen.groups.first().filter(|_| seen.nested.is_some()) {
+            Some(group) => effects_versus_patterns::weigh(evidence.question(), &named.library, generics, group.first()),
             None => effects_versus_patterns::Weighed::default(),
         };
         let mut beside = decide::OtherEvidence {
@@ -284,8 +289,11 @@ impl<'a> Tested<'a> {
             scatter: scatter(fit, machine, evidence),
         };
         let mut decision = decide::decide(&seen, &beside);
-        if let Some(pair) = pairs::both(subject, &seen, &decision, &generics) {
-            pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most);
+        if let Some(pair) = pairs::both(subject, &seen, &decision, generics) {
+            if seen.nested.is_none() && !options.lists() {
+                seen.ordered = found.search_for_order(fit);
+            }
+            pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most.max(1));
             seen.groups.iter_mut().for_each(|group| without_needless_incidents(group, named));
             (seen.both, seen.given) = (Some(pair), true);
             (beside.shapes_win, beside.better) = (false, None);
@@ -333,9 +341,9 @@ impl<'a> Tested<'a> {
             || assemble_diagnosis::put_together(subject, &seen, features, (decision, &beside), gross, options),
             || refitted.as_ref().map(|again| still_fails(again, machine, catalogue)),
         );
-        if out.mistake().is_none() {
+        if out.mistake().is_none() && options.lists() {
             let gathered = beside.gathered.is_some();
-            out.consequences = consequence::consequences(subject, &seen, &generics, (&out.verdict, gathered))?;
+            out.consequences = consequence::consequences(subject, &seen, generics, (&out.verdict, gathered))?;
         }
         if options.refit
             && let Some(first) = out.candidates.first_mut()
@@ -436,12 +444,11 @@ fn settings_with(subject: Subject, more: &[&str]) -> Settings {
 /// Does a fit still miss something, by the tests of the first step?
 fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
     let features = Arc::new(features::features(fit, machine));
-    let Regression { evidence, named, .. } = Regression::new(fit, machine, catalogue, &features);
+    let Regression { evidence, named, generics, .. } = Regression::new(fit, machine, catalogue, &features);
     let question = evidence.question();
     if Search::new(question, &named.library).leader().is_some() {
         return true;
     }
-    let generics = features::shapes(&evidence, &features);
     dependences(question, &features, &generics).iter().any(|d| d.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL)
         || lack_of_fit(&question).p < decide::LACK_OF_FIT
 }

@@ -107,7 +107,7 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
     let effects: Vec<(&Effect, Option<f64>)> = candidates
         .iter()
         .map(|&c| {
-            let variant = seen.order.scores[c].variant;
+            let variant = seen.order().scores[c].variant;
             let shape = seen.named.library.candidates()[c].variants[variant].shape;
             (seen.named.effects[c], seen.named.scanned[c].as_ref().map(|_| shape))
         })
@@ -121,7 +121,7 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
             let effects = candidates
                 .iter()
                 .zip(spans)
-                .map(|(&c, span)| (c, span, seen.order.scores[c].estimate.clone()))
+                .map(|(&c, span)| (c, span, seen.order().scores[c].estimate.clone()))
                 .collect();
             let products = Products::new(view.base(), &view.library.matrix());
             Ok(Tried {
@@ -201,7 +201,7 @@ const LEAST_DIFFERENCE_UM: f64 = 0.05;
 fn by_difference(subject: Subject, seen: &Examination, group: &Group) -> String {
     let chosen = group.first();
     let Some(rival) = group.members.iter().map(|m| m.candidate).find(|&c| c != chosen) else { return String::new() };
-    let trace = |c: usize| -> DVector<f64> { seen.raw_um(c) * &seen.order.scores[c].estimate };
+    let trace = |c: usize| -> DVector<f64> { seen.raw_um(c) * &seen.order().scores[c].estimate };
     let difference = trace(chosen) - trace(rival);
     let further = |a: &usize, b: &usize| difference[*a].abs().total_cmp(&difference[*b].abs());
     let Some(most) = seen.evidence.used.iter().copied().max_by(further) else { return String::new() };

@@ -2,7 +2,8 @@
 
 use super::Subject;
 use super::error_locations;
-use super::features::{features, shapes};
+use super::features::features;
+use super::visit_scatter::Regression;
 use crate::diag::{Failure, Result};
 use crate::fit::Fit;
 use crate::search::dependence::{Dependence, dependences};
@@ -32,9 +33,8 @@ pub struct Sketch {
 /// When nothing significant is left, or what is left has no formula.
 pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> {
     let features = std::sync::Arc::new(features(subject.fit, subject.machine));
-    let evidence =
-        super::visit_scatter::Regression::new(subject.fit, subject.machine, subject.catalogue, &features).evidence;
-    let generics = shapes(&evidence, &features);
+    let Regression { evidence, generics, .. } =
+        Regression::new(subject.fit, subject.machine, subject.catalogue, &features);
     let all = dependences(evidence.question(), &features, &generics);
     let best = best(&all, subject.fit)?;
     let share = super::assemble_diagnosis::beyond_the_noise(&evidence, best.share, best.terms.len());

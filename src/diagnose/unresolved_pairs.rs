@@ -19,11 +19,11 @@ pub struct Open {
 #[must_use]
 pub(super) fn open(seen: &Examination) -> Open {
     let Some(first) = seen.groups.first() else { return Open::default() };
-    let ln_p = |g: &Group| seen.order.scores[g.leader].ln_p;
+    let ln_p = |g: &Group| seen.order().scores[g.leader].ln_p;
     let best = ln_p(first);
     let tied = |g: &&Group| best.is_finite() && ln_p(g) - best < AS_LIKELY;
     let suspect = |candidate: usize| {
-        let score = &seen.order.scores[candidate];
+        let score = &seen.order().scores[candidate];
         let shape = seen.named.library.candidates()[candidate].variants[score.variant].shape;
         Suspect {
             id: seen.named.effects[candidate].id.clone(),

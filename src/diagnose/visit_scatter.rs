@@ -11,12 +11,13 @@ use crate::fit::residual_scatter::MOST_TIMES;
 use crate::fit::{Fit, VisitSource, declared_tau_mm};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
-use crate::search::pattern_tests::Features;
+use crate::search::pattern_tests::{Features, Generics};
 use crate::search::{
     Basis, Change, KEPT, Library, Question, Scatter, Search, Supposed, lack_of_fit, scatter_that_fits,
 };
-use nalgebra::DMatrix;
-use std::sync::Arc;
+use nalgebra::{DMatrix, DMatrixViewMut};
+use rayon::prelude::*;
+use std::sync::{Arc, OnceLock};
 
 /// Most effects or patterns that are supposed to be there at once.
 const MOST_AT_ONCE: usize = 4;
@@ -29,38 +30,48 @@ pub(super) struct Regression<'c> {
     /// What all tests share.
     pub evidence: Evidence,
     pub named: Named<'c>,
-    /// The same with the scatter that is left with the most likely effect, where no test passes: the order of the candidates.
-    pub ordered: Option<(Evidence, Library)>,
+    /// Shapes without a name.
+    pub generics: Generics,
+    /// The scatter that is left with the most likely effect, mm, where it is less than that of the tests.
+    order_mm: Option<f64>,
+    ordered: OnceLock<Option<(Evidence, Library)>>,
 }
 
 impl<'c> Regression<'c> {
     pub fn new(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue, features: &Arc<Features>) -> Self {
         let first = calm(fit, machine, catalogue, features).unwrap_or_else(|| Evidence::from_fit(fit));
-        let named = Named::for_fit(fit, &first, machine, catalogue);
-        let Some(scatter) = estimated(fit, machine, &first, &named, features) else {
-            return Self { evidence: first, named, ordered: None };
+        let (named, generics) =
+            rayon::join(|| Named::for_fit(fit, &first, machine, catalogue), || features::shapes(&first, features));
+        let Some(scatter) = estimated(fit, machine, &first, &named, &generics) else {
+            return Self { evidence: first, named, generics, order_mm: None, ordered: OnceLock::new() };
         };
-        let normals = fit.visit_normals();
-        let at = |tau_mm: f64| {
-            let change = normals.change(first.tau_mm, tau_mm);
-            (Evidence::with_visits(fit, tau_mm), named.changed(&|columns| change.apply(columns)))
+        let change = fit.visit_normals().change(first.tau_mm, scatter.tests);
+        let change: Change = &|columns| change.apply_to(columns);
+        let evidence = Evidence::with_visits(fit, scatter.tests);
+        Self {
+            named: named.changed(change).unwrap_or_else(|| Named::for_fit(fit, &evidence, machine, catalogue)),
+            generics: generics.changed(change).unwrap_or_else(|| features::shapes(&evidence, features)),
+            order_mm: Some(scatter.order).filter(|order_mm| *order_mm < scatter.tests),
+            ordered: OnceLock::new(),
+            evidence,
+        }
+    }
+
+    /// The tests of effects with the scatter that is left with the most likely one: their order where no test passes. Its columns are
+    /// made when it is asked for.
+    pub fn search_for_order(&self, fit: &Fit) -> Option<Search<'_>> {
+        let make = |tau_mm: f64| {
+            let change = fit.visit_normals().change(self.evidence.tau_mm, tau_mm);
+            let library = self.named.library.changed(&|columns| change.apply_to(columns))?;
+            Some((Evidence::with_visits(fit, tau_mm), library))
         };
-        let ordered = (scatter.order < scatter.tests).then(|| at(scatter.order));
-        let ordered = ordered.and_then(|(evidence, named)| Some((evidence, named?.library)));
-        let (evidence, own) = at(scatter.tests);
-        let named = own.unwrap_or_else(|| Named::for_fit(fit, &evidence, machine, catalogue));
-        Self { evidence, named, ordered }
+        let (evidence, library) = self.ordered.get_or_init(|| self.order_mm.and_then(make)).as_ref()?;
+        Some(Search::new(evidence.question(), library))
     }
 }
 
 /// The scatter of index positions, mm, for the tests and for the order of the candidates; `None` where it is known or of no account.
-fn estimated(
-    fit: &Fit,
-    machine: &Machine,
-    first: &Evidence,
-    named: &Named,
-    features: &Arc<Features>,
-) -> Option<Scatter> {
+fn estimated(fit: &Fit, machine: &Machine, first: &Evidence, named: &Named, generics: &Generics) -> Option<Scatter> {
     let declared_mm = declared_tau_mm(machine, &fit.data.observations);
     let most_mm = MOST_TIMES * declared_mm;
     // revisited poses say it without any model
@@ -70,20 +81,20 @@ fn estimated(
     let normals = fit.visit_normals();
     // groups of visits are the scatter itself
     let mut library = named.library.clone();
-    library.append(features::shapes(first, features).without("visit"));
+    library.append(generics.without("visit"));
     let changes: Vec<(f64, _)> = SUPPOSED
         .iter()
         .map(|part| {
             let tau_mm = part * most_mm;
             let change = normals.change(first.tau_mm, tau_mm);
-            (tau_mm, move |columns: &mut DMatrix<f64>| change.apply(columns))
+            (tau_mm, move |columns: DMatrixViewMut<'_, f64>| change.apply_to(columns))
         })
         .collect();
     let base = first.base.transposed().transpose();
-    let supposed = changes.iter().map(|(tau_mm, change)| {
+    let supposed = changes.par_iter().map(|(tau_mm, change)| {
         let (mut own, mut residual) = (base.clone(), DMatrix::from_columns(std::slice::from_ref(&first.residual)));
-        change(&mut own);
-        change(&mut residual);
+        change(own.as_view_mut());
+        change(residual.as_view_mut());
         Supposed {
             tau: *tau_mm,
             residual: residual.column(0).into_owned(),

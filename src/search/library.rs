@@ -1,6 +1,6 @@
 //! Candidates and their columns, stacked so that one product serves all.
 
-use nalgebra::{DMatrix, DMatrixView, DVectorView};
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVectorView};
 use rayon::prelude::*;
 use std::borrow::Borrow;
 use std::ops::Range;
@@ -328,9 +328,13 @@ impl Library {
     pub fn changed(&self, change: super::Change) -> Option<Self> {
         let changed = |part: &Part| match &part.columns {
             Columns::Kept(data) => {
-                let mut columns = DMatrix::from_column_slice(self.n_rows, part.span.len(), data);
-                change(&mut columns);
-                Some(Part { span: part.span.clone(), columns: Columns::Kept(Arc::new(columns.data.into())) })
+                let mut changed = vec![0.0; data.len()];
+                let size = (CHUNK * self.n_rows).max(1);
+                changed.par_chunks_mut(size).zip(data.par_chunks(size)).for_each(|(to, from)| {
+                    to.copy_from_slice(from);
+                    change(DMatrixViewMut::from_slice(to, self.n_rows, to.len() / self.n_rows));
+                });
+                Some(Part { span: part.span.clone(), columns: Columns::Kept(Arc::new(changed)) })
             }
             Columns::Made { .. } => None,
         };

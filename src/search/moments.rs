@@ -7,7 +7,7 @@
 
 use super::basis::Basis;
 use super::library::Library;
-use nalgebra::{DMatrix, DMatrixView, DVector};
+use nalgebra::{DMatrix, DMatrixView, DMatrixViewMut, DVector};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ use std::ops::Range;
 pub const KEPT: f64 = 1e-3;
 
 /// What turns rows of a library into those of another regression of the same touches.
-pub type Change<'a> = &'a (dyn Fn(&mut DMatrix<f64>) + Sync);
+pub type Change<'a> = &'a (dyn Fn(DMatrixViewMut<'_, f64>) + Sync);
 
 /// A regression of the touches of a library.
 #[derive(Clone, Copy)]
@@ -65,7 +65,7 @@ impl Moments {
                 let each = regressions.iter().zip(&projected).map(|(regression, r)| {
                     let changed = regression.change.map(|change| {
                         let mut own = whole.into_owned();
-                        change(&mut own);
+                        change(own.as_view_mut());
                         own
                     });
                     let j = changed.as_ref().map_or(whole, DMatrix::as_view);

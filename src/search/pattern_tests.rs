@@ -5,6 +5,7 @@
 //! all as candidates of the same tests, a scan as the variants of one candidate.
 
 use super::library::{Library, Origin, Variant};
+use super::moments::Change;
 use super::shapes::{Function, Grouping};
 use nalgebra::{DMatrix, Vector3};
 use rayon::prelude::*;
@@ -200,6 +201,12 @@ impl Generics {
     #[must_use]
     pub fn without(&self, depends_on: &str) -> Library {
         self.library.most(|c| self.shapes[c].depends_on != depends_on)
+    }
+
+    /// The same in a regression whose rows a change makes of this one's; `None` where columns are not kept in memory.
+    #[must_use]
+    pub fn changed(&self, change: Change) -> Option<Self> {
+        Some(Self { library: self.library.changed(change)?, shapes: self.shapes.clone() })
     }
 }
 

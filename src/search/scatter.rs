@@ -85,7 +85,7 @@ pub fn scatter_that_fits(
         }
         for (s, t) in supposed.iter_mut().zip(&tested) {
             let mut columns = some.columns(best.candidate, best.variant);
-            (s.change)(&mut columns);
+            (s.change)(columns.as_view_mut());
             s.ln_det += t.scores[best.candidate].ln_left[best.variant];
             if s.base.extend(&columns, KEPT) == 0 {
                 return found;
