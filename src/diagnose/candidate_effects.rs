@@ -157,7 +157,7 @@ struct Tried {
     /// The value; 0 where nothing is scanned.
     value: f64,
     /// What its sizes would do, as rows of the tests; nothing where it is made anew whenever it is needed.
-    white: DMatrix<f64>,
+    white: Arc<Vec<f64>>,
 }
 
 /// Makes and compares columns of effects that are not in the model.
@@ -170,9 +170,10 @@ struct Maker<'a> {
 impl Maker<'_> {
     /// Effect number i with its shapes where they start, one of them (by its place among the shapes) at another value.
     fn make(&self, i: usize, shape: Option<(usize, f64)>) -> Tried {
-        let white = match Library::keeps(self.evidence.n_rows()) {
-            true => self.evidence.whiten(self.source.columns(Chosen { effect: i, shape }, None)),
-            false => DMatrix::zeros(0, 0),
+        let n_rows = self.evidence.n_rows();
+        let white = match Library::keeps(n_rows) {
+            true => Library::part(n_rows, self.evidence.whiten(self.source.columns(Chosen { effect: i, shape }, None))),
+            false => Arc::default(),
         };
         Tried { value: shape.map_or(0.0, |(_, value)| value), white }
     }
@@ -182,7 +183,7 @@ impl Maker<'_> {
         let n = self.source.sizes(i).count();
         let n_rows = self.evidence.n_rows();
         let mut library = if Library::keeps(n_rows) {
-            Library::of_matrices(n_rows, tried.iter().map(|t| &t.white))
+            Library::of_parts(n_rows, tried.iter().map(|t| &t.white))
         } else {
             let chosen = |t: &Tried| {
                 let chosen = Chosen { effect: i, shape: Some((which, t.value)) };
@@ -300,7 +301,8 @@ impl<'c> Named<'c> {
         };
         let each = || tried.iter().enumerate().flat_map(|(i, (which, all))| all.iter().map(move |t| (i, *which, t)));
         let mut library = if kept {
-            Library::of_matrices(evidence.n_rows(), tried.iter().flat_map(|(_, all)| all).map(|t| &t.white))
+            let parts: Vec<Arc<Vec<f64>>> = tried.iter().flat_map(|(_, all)| all).map(|t| t.white.clone()).collect();
+            Library::joined(evidence.n_rows(), &parts)
         } else {
             let all: Vec<(Chosen, usize)> = each().flat_map(|(i, which, t)| chosen(i, which, t)).collect();
             Library::made(evidence.n_rows(), all.len(), source.make(all))
@@ -328,9 +330,8 @@ impl<'c> Named<'c> {
     }
 
     /// The same candidates in a regression whose rows a change makes of this one's; `None` where columns are not kept in memory.
-    pub(super) fn changed(&self, change: Change) -> Option<Self> {
-        let library = self.library.changed(change)?;
-        Some(Self { library, ..self.clone() })
+    pub(super) fn changed(self, change: Change) -> Option<Self> {
+        Some(Self { library: self.library.changed(change)?, ..self })
     }
 
     /// Columns of some variants of candidates (both by index) before whitening, µm per typical size; touches that are not used

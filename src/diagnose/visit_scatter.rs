@@ -62,7 +62,7 @@ impl<'c> Regression<'c> {
     pub fn search_for_order(&self, fit: &Fit) -> Option<Search<'_>> {
         let make = |tau_mm: f64| {
             let change = fit.visit_normals().change(self.evidence.tau_mm, tau_mm);
-            let library = self.named.library.changed(&|columns| change.apply_to(columns))?;
+            let library = self.named.library.clone().changed(&|columns| change.apply_to(columns))?;
             Some((Evidence::with_visits(fit, tau_mm), library))
         };
         let (evidence, library) = self.ordered.get_or_init(|| self.order_mm.and_then(make)).as_ref()?;

@@ -35,9 +35,16 @@ impl Visit {
     fn apply(&self, part: &mut [f64]) {
         let (x, others) = self.normals.as_slice().split_at(part.len());
         let (y, z) = others.split_at(part.len());
-        let each = || x.iter().zip(y).zip(z).map(|((x, y), z)| Vector3::new(*x, *y, *z));
-        let by = self.root * each().zip(&*part).map(|(normal, value)| normal * *value).sum::<Vector3<f64>>();
-        part.iter_mut().zip(each()).for_each(|(value, normal)| *value -= normal.dot(&by));
+        let mut shared = Vector3::zeros();
+        for (((value, x), y), z) in part.iter().zip(x).zip(y).zip(z) {
+            shared.x += x * value;
+            shared.y += y * value;
+            shared.z += z * value;
+        }
+        let by = self.root * shared;
+        for (((value, x), y), z) in part.iter_mut().zip(x).zip(y).zip(z) {
+            *value -= x * by.x + y * by.y + z * by.z;
+        }
     }
 }
 

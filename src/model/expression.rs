@@ -75,6 +75,24 @@ impl Expression {
         }
     }
 
+    /// Its values where each variable has many, `count` of them: each step is taken for all of them at once.
+    pub(super) fn values(&self, variables: &[Vec<f64>], count: usize) -> Vec<f64> {
+        let mut waiting: Vec<Vec<f64>> = Vec::with_capacity(self.most_waiting);
+        for step in &self.steps {
+            match *step {
+                Step::Number(value) => waiting.push(vec![value; count]),
+                Step::Variable(at) => waiting.push(variables[at].clone()),
+                Step::One(of) => waiting.last_mut().into_iter().flatten().for_each(|value| *value = of.at(*value)),
+                Step::Two(of) => {
+                    let right = waiting.pop().unwrap_or_default();
+                    let left = waiting.last_mut().into_iter().flatten();
+                    left.zip(right).for_each(|(value, right)| *value = of.at(*value, right));
+                }
+            }
+        }
+        waiting.pop().unwrap_or_default()
+    }
+
     /// Takes the steps, with room for the values that wait.
     fn run<V: Value>(&self, variables: &[V], waiting: &mut [V]) -> V {
         let mut count = 0;

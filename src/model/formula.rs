@@ -229,20 +229,22 @@ impl Formula {
             Origin::Shape(i) => Err(shapes.get(*i).copied().unwrap_or(f64::NAN)),
         };
         let columns: Vec<std::result::Result<&[f64], f64>> = origins.iter().map(column).collect();
-        let mut before = [0.0_f64; MOST_VARIABLES];
-        let (before, mut last) = (&mut before[..origins.len()], None);
-        let value = |touch: usize| {
-            let mut same = true;
-            for (before, column) in before.iter_mut().zip(&columns) {
-                let value = column.map_or_else(|number| number, |column| column[touch]);
-                same &= before.to_bits() == value.to_bits();
-                *before = value;
+        // by variable, the values that differ from those of the touch before; and which of them each touch has
+        let (mut distinct, mut place) = (vec![Vec::new(); columns.len()], Vec::with_capacity(touches.size_hint().0));
+        let (mut before, mut count) = (None, 0);
+        for touch in touches {
+            let is_same = |from: usize, column: &[f64]| column[from].to_bits() == column[touch].to_bits();
+            if !before.is_some_and(|from| columns.iter().flatten().all(|column| is_same(from, column))) {
+                for (distinct, column) in distinct.iter_mut().zip(&columns) {
+                    distinct.push(column.map_or_else(|number| number, |column| column[touch]));
+                }
+                count += 1;
             }
-            let value = last.filter(|_| same).unwrap_or_else(|| expression.value(before));
-            last = Some(value);
-            value
-        };
-        touches.map(value).collect()
+            place.push(count - 1);
+            before = Some(touch);
+        }
+        let values = expression.values(&distinct, count);
+        place.into_iter().map(|place| values[place]).collect()
     }
 
     /// Derivatives with respect to the shape parameters that stand inside: (which, value).

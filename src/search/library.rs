@@ -68,7 +68,7 @@ pub type Make = Arc<dyn Fn(&[usize], Option<&[usize]>) -> DMatrix<f64> + Send + 
 const MOST_ROWS_KEPT: usize = 4_000;
 
 /// Columns that are worked on at once.
-const CHUNK: usize = 64;
+const CHUNK: usize = 128;
 
 /// Numbers in them: 16 MB. Larger pieces of memory may be handed back to the system after each use, and cleared before the next.
 const CHUNK_NUMBERS: usize = 2_000_000;
@@ -135,6 +135,41 @@ impl Library {
         let mut data = Vec::with_capacity(matrices.clone().map(DMatrix::len).sum());
         matrices.for_each(|columns| data.extend_from_slice(columns.as_slice()));
         Self::kept(n_rows, data)
+    }
+
+    /// Columns that are to stand in a library ([`Library::of_parts`], [`Library::joined`]): those of rounding are nothing.
+    #[must_use]
+    pub fn part(n_rows: usize, columns: DMatrix<f64>) -> Arc<Vec<f64>> {
+        let mut data: Vec<f64> = columns.data.into();
+        clear_rounding(&mut data, n_rows);
+        Arc::new(data)
+    }
+
+    /// A library of such columns where they are. Many small parts are slower to work with than one, and not to be copied.
+    #[must_use]
+    pub fn of_parts<'a>(n_rows: usize, parts: impl Iterator<Item = &'a Arc<Vec<f64>>>) -> Self {
+        let mut out = Self::new(n_rows);
+        for data in parts.filter(|data| !data.is_empty()) {
+            let first = out.n_columns();
+            let span = first..first + data.len().checked_div(n_rows).unwrap_or(0);
+            out.parts.push(Part { span, columns: Columns::Kept(data.clone()) });
+        }
+        out
+    }
+
+    /// A library of such columns in one piece.
+    #[must_use]
+    pub fn joined(n_rows: usize, parts: &[Arc<Vec<f64>>]) -> Self {
+        let mut data = vec![0.0; parts.iter().map(|part| part.len()).sum()];
+        let mut left = data.as_mut_slice();
+        let mut jobs = Vec::with_capacity(parts.len());
+        for part in parts {
+            let (own, behind) = left.split_at_mut(part.len());
+            jobs.push((own, part));
+            left = behind;
+        }
+        jobs.into_par_iter().for_each(|(own, part)| own.copy_from_slice(part));
+        Self::of_parts(n_rows, std::iter::once(&Arc::new(data)))
     }
 
     /// A library of columns that are made when they are needed: many touches have more of them than memory holds.
@@ -325,21 +360,17 @@ impl Library {
 
     /// The same candidates in a regression whose rows a change makes of this one's; `None` where columns are not kept in memory.
     #[must_use]
-    pub fn changed(&self, change: super::Change) -> Option<Self> {
-        let changed = |part: &Part| match &part.columns {
-            Columns::Kept(data) => {
-                let mut changed = vec![0.0; data.len()];
-                let size = (CHUNK * self.n_rows).max(1);
-                changed.par_chunks_mut(size).zip(data.par_chunks(size)).for_each(|(to, from)| {
-                    to.copy_from_slice(from);
-                    change(DMatrixViewMut::from_slice(to, self.n_rows, to.len() / self.n_rows));
-                });
-                Some(Part { span: part.span.clone(), columns: Columns::Kept(Arc::new(changed)) })
-            }
-            Columns::Made { .. } => None,
-        };
-        let parts = self.parts.iter().map(changed).collect::<Option<_>>()?;
-        Some(Self { n_rows: self.n_rows, parts, candidates: self.candidates.clone() })
+    pub fn changed(mut self, change: super::Change) -> Option<Self> {
+        let n_rows = self.n_rows;
+        for part in &mut self.parts {
+            let Columns::Kept(data) = &mut part.columns else { return None };
+            // in place, unless somebody else has them
+            Arc::make_mut(data).par_chunks_mut((CHUNK * n_rows).max(1)).for_each(|some| {
+                let columns = some.len() / n_rows;
+                change(DMatrixViewMut::from_slice(some, n_rows, columns));
+            });
+        }
+        Some(self)
     }
 
     /// A library of one of the candidates, with all its variants.

@@ -26,9 +26,6 @@ pub(super) struct Regression<'a> {
     pub change: Option<Change<'a>>,
 }
 
-/// Jᵀr and QᵀJ of some columns of a library, and JᵀJ of each variant among them.
-type Piece = (Vec<f64>, DMatrix<f64>, Vec<DMatrix<f64>>);
-
 /// Inner products of a regression and its candidates.
 #[derive(Debug, Clone)]
 pub(super) struct Moments {
@@ -58,42 +55,53 @@ impl Moments {
         let variants = library.candidates().iter().flat_map(|c| &c.variants).map(|v| v.columns.clone());
         let mut variants: Vec<(usize, Range<usize>)> = variants.enumerate().collect();
         variants.sort_by_key(|(_, columns)| columns.start);
-        let of = |span: Range<usize>| -> Vec<Piece> {
+        let n_columns = library.n_columns();
+        let empty = |(r, projected): (&Regression, &DVector<f64>)| Self {
+            n: r.residual.len(),
+            p: r.base.rank(),
+            rr: projected.norm_squared(),
+            jr: DVector::zeros(n_columns),
+            qj: DMatrix::from_vec(r.base.rank(), n_columns, vec![0.0; r.base.rank() * n_columns]),
+            blocks: vec![DMatrix::zeros(0, 0); variants.len()],
+        };
+        let mut out: Vec<Self> = regressions.iter().zip(&projected).map(empty).collect();
+        // every piece of the library has its own places in the results, and is written there at once
+        let mut jobs: Vec<(Range<usize>, Vec<(&mut [f64], &mut [f64])>)> =
+            library.chunks().into_iter().map(|span| (span, Vec::with_capacity(regressions.len()))).collect();
+        for Self { p, jr, qj, .. } in &mut out {
+            let (mut jr, mut qj, mut at) = (jr.as_mut_slice(), qj.as_mut_slice(), 0);
+            for (span, places) in &mut jobs {
+                let (own_jr, behind_jr) = jr.split_at_mut(span.end - at);
+                let (own_qj, behind_qj) = qj.split_at_mut((span.end - at) * *p);
+                places.push((&mut own_jr[span.start - at..], &mut own_qj[(span.start - at) * *p..]));
+                (jr, qj, at) = (behind_jr, behind_qj, span.end);
+            }
+        }
+        let of = |(span, places): (Range<usize>, Vec<(&mut [f64], &mut [f64])>)| -> Vec<Vec<DMatrix<f64>>> {
             let from = variants.partition_point(|(_, v)| v.start < span.start);
             let own = variants[from..].iter().take_while(|(_, v)| v.end <= span.end);
             library.with(span.clone(), |whole| {
-                let each = regressions.iter().zip(&projected).map(|(regression, r)| {
+                let each = regressions.iter().zip(&projected).zip(places).map(|((regression, r), (jr, qj))| {
                     let changed = regression.change.map(|change| {
                         let mut own = whole.into_owned();
                         change(own.as_view_mut());
                         own
                     });
                     let j = changed.as_ref().map_or(whole, DMatrix::as_view);
-                    let jr = j.column_iter().map(|column| column.dot(r)).collect();
-                    let blocks = own.clone().map(|(_, v)| block(j.columns(v.start - span.start, v.len()))).collect();
-                    (jr, regression.base.transposed() * j, blocks)
+                    jr.iter_mut().zip(j.column_iter()).for_each(|(to, column)| *to = column.dot(r));
+                    let q_t = regression.base.transposed();
+                    DMatrixViewMut::from_slice(qj, q_t.nrows(), span.len()).gemm(1.0, q_t, &j, 0.0);
+                    own.clone().map(|(_, v)| block(j.columns(v.start - span.start, v.len()))).collect()
                 });
                 each.collect()
             })
         };
-        let empty = |(r, projected): (&Regression, &DVector<f64>)| Self {
-            n: r.residual.len(),
-            p: r.base.rank(),
-            rr: projected.norm_squared(),
-            jr: DVector::zeros(library.n_columns()),
-            qj: DMatrix::zeros(r.base.rank(), library.n_columns()),
-            blocks: vec![DMatrix::zeros(0, 0); variants.len()],
-        };
-        let mut out: Vec<Self> = regressions.iter().zip(&projected).map(empty).collect();
-        let chunks = library.chunks();
-        let pieces: Vec<_> = chunks.par_iter().map(|span| of(span.clone())).collect();
+        let pieces: Vec<Vec<Vec<DMatrix<f64>>>> = jobs.into_par_iter().map(of).collect();
         let mut at = 0;
-        for (span, each) in chunks.into_iter().zip(pieces) {
+        for each in pieces {
             let from = at;
-            for (moments, (jr, qj, blocks)) in out.iter_mut().zip(each) {
+            for (moments, blocks) in out.iter_mut().zip(each) {
                 at = from + blocks.len();
-                moments.jr.rows_mut(span.start, span.len()).copy_from_slice(&jr);
-                moments.qj.columns_mut(span.start, span.len()).copy_from(&qj);
                 for ((variant, _), block) in variants[from..at].iter().zip(blocks) {
                     moments.blocks[*variant] = block;
                 }
@@ -118,9 +126,12 @@ impl Moments {
     /// JᵀPJ of a variant in pieces: what its directions are and how much of them is left.
     pub fn block(&self, index: usize, first: usize) -> Block {
         let raw = &self.blocks[index];
-        let q = raw.nrows();
-        let w = self.qj.columns(first, q);
-        Block::new(raw, &(raw - w.transpose() * w))
+        let w = self.qj.columns(first, raw.nrows());
+        // most candidates are of one column
+        match raw.as_slice() {
+            [raw] => Block::of_one(*raw, raw - w.iter().map(|w| w * w).sum::<f64>()),
+            _ => Block::new(raw, &(raw - w.transpose() * w)),
+        }
     }
 }
 
@@ -148,22 +159,26 @@ pub(super) struct Block {
 }
 
 impl Block {
+    /// Of one column.
+    fn of_one(raw: f64, left: f64) -> Self {
+        let scale = if raw > 0.0 { raw.sqrt().recip() } else { 0.0 };
+        let kept = if raw > 0.0 { (left.max(0.0) / raw).sqrt() } else { 0.0 };
+        let value = left * scale * scale;
+        let is_seen = value > KEPT * KEPT;
+        let whitener = if is_seen { DMatrix::from_element(1, 1, scale / value.sqrt()) } else { DMatrix::zeros(1, 0) };
+        Self { whitener, kept }
+    }
+
     /// From JᵀJ and JᵀPJ.
     pub fn new(raw: &DMatrix<f64>, left: &DMatrix<f64>) -> Self {
         let m = raw.nrows();
+        if m == 1 {
+            return Self::of_one(raw[(0, 0)], left[(0, 0)]);
+        }
         let norms: Vec<f64> = (0..m).map(|i| raw[(i, i)].max(0.0).sqrt()).collect();
         let scale = |i: usize| if norms[i] > 0.0 { 1.0 / norms[i] } else { 0.0 };
         let total: f64 = raw.trace();
         let kept = if total > 0.0 { (left.trace().max(0.0) / total).sqrt() } else { 0.0 };
-        if m == 1 {
-            let value = left[(0, 0)] * scale(0) * scale(0);
-            let whitener = if value > KEPT * KEPT {
-                DMatrix::from_element(1, 1, scale(0) / value.sqrt())
-            } else {
-                DMatrix::zeros(1, 0)
-            };
-            return Self { whitener, kept };
-        }
         let scaled = DMatrix::from_fn(m, m, |i, j| left[(i, j)] * scale(i) * scale(j));
         let eigen = scaled.symmetric_eigen();
         let seen: Vec<usize> = (0..m).filter(|&i| eigen.eigenvalues[i] > KEPT * KEPT).collect();

@@ -205,8 +205,8 @@ impl Generics {
 
     /// The same in a regression whose rows a change makes of this one's; `None` where columns are not kept in memory.
     #[must_use]
-    pub fn changed(&self, change: Change) -> Option<Self> {
-        Some(Self { library: self.library.changed(change)?, shapes: self.shapes.clone() })
+    pub fn changed(self, change: Change) -> Option<Self> {
+        Some(Self { library: self.library.changed(change)?, ..self })
     }
 }
 
@@ -295,11 +295,13 @@ fn gaps<'a>(
         let weight = shape.direction.map(|d| &features.directions[d].weight);
         let partly: Vec<&Variable> =
             shape.variables.iter().map(|&v| &features.variables[v]).filter(|v| !v.acts.is_empty()).collect();
-        for ((gap, value), touch) in column.iter_mut().zip(&known[at].1).zip(touches.clone()) {
-            let weight = weight.map_or(1.0, |w| w[touch]);
-            if weight != 0.0 && partly.iter().all(|v| v.acts_at(touch)) {
-                *gap = weight * value;
-            }
+        let values = column.iter_mut().zip(&known[at].1).zip(touches.clone());
+        if partly.is_empty() {
+            values.for_each(|((gap, value), touch)| *gap = weight.map_or(1.0, |w| w[touch]) * value);
+            continue;
+        }
+        for ((gap, value), touch) in values.filter(|(_, touch)| partly.iter().all(|v| v.acts_at(*touch))) {
+            *gap = weight.map_or(1.0, |w| w[touch]) * value;
         }
     }
     out
