@@ -10,7 +10,7 @@ use crate::model::formula::slot;
 use crate::model::predict::{Model, Observation, Unknown};
 use crate::model::sensitivities::Sensitivities;
 use crate::search::library::Make;
-use crate::search::{self, Change, Library, Origin, Search};
+use crate::search::{self, Change, Library, Origin};
 use crate::units::um_from_mm;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -194,8 +194,7 @@ impl Maker<'_> {
         };
         let variant = |(k, t): (usize, &Tried)| search::Variant { shape: t.value, columns: k * n..(k + 1) * n };
         library.place("tried", Origin::Catalogue, tried.iter().enumerate().map(variant).collect(), 1);
-        let score = Search::new(self.evidence.question(), &library).scores.into_iter().next()?;
-        Some((score.variant, score.delta_ss))
+        search::best_variant(self.evidence.question(), &library)
     }
 
     /// An effect at all values of its scan, and at a better one beside the best of them: a jump that was tried between index

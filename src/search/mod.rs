@@ -32,4 +32,4 @@ pub use library::{Candidate, Library, Origin, Variant, without_rounding};
 pub use moments::{Change, KEPT};
 pub use pairs::Pair;
 pub use scatter::{Scatter, Supposed, scatter_that_fits};
-pub use score::{LackOfFit, PureError, Question, Score, Search, lack_of_fit};
+pub use score::{LackOfFit, PureError, Question, Score, Search, best_variant, lack_of_fit};

@@ -2,7 +2,7 @@
 
 use super::basis::Basis;
 use super::distributions::{ln_p_of_f, ln_p_of_scan, p_of_chi2};
-use super::library::{Library, Origin};
+use super::library::{Candidate, Library, Origin, Variant};
 use super::moments::{Block, Moments};
 use super::multiplicity::{self, Family};
 use nalgebra::{DMatrix, DVector};
@@ -208,43 +208,81 @@ pub(super) fn score(moments: &Moments, library: &Library, pure: Option<PureError
     scores
 }
 
-/// The score test of a candidate; its variants are those from `first` on.
-fn score_of(moments: &Moments, library: &Library, pure: Option<PureError>, (c, first): (usize, usize)) -> Score {
+/// What a variant takes away from the misfit.
+struct Taken {
+    block: Block,
+    /// Of the residual, in the block's own directions.
+    along: DVector<f64>,
+    delta_ss: f64,
+    ln_p: f64,
+}
+
+/// What there is to be taken from, and on how many degrees of freedom.
+fn whole(moments: &Moments, pure: Option<PureError>) -> (f64, f64) {
     let (pure_ss, pure_dof) = match pure {
         Some(e) if !e.within => (e.variance * e.dof, e.dof),
         _ => (0.0, 0.0),
     };
-    let free = moments.n as f64 - moments.p as f64 + pure_dof;
-    let total = moments.rr + pure_ss;
-    let candidate = &library.candidates()[c];
-    let n_scanned = if candidate.variants.len() > 1 { candidate.n_scanned } else { 0 };
-    let mut scan = Vec::with_capacity(candidate.variants.len());
-    let mut ln_left = Vec::with_capacity(candidate.variants.len());
-    let mut ln_each = Vec::with_capacity(candidate.variants.len());
-    let mut best: Option<(usize, Block, DVector<f64>, f64)> = None;
-    for (v, variant) in candidate.variants.iter().enumerate() {
+    (moments.rr + pure_ss, moments.n as f64 - moments.p as f64 + pure_dof)
+}
+
+/// Shape parameters that a candidate's scan costs.
+fn n_scanned(candidate: &Candidate) -> usize {
+    if candidate.variants.len() > 1 { candidate.n_scanned } else { 0 }
+}
+
+/// What each variant of a candidate takes away, where these touches see it; its variants are those from `first` on.
+fn taken(moments: &Moments, candidate: &Candidate, pure: Option<PureError>, first: usize) -> Vec<Option<Taken>> {
+    /// Variants that are no work for a thread of its own.
+    const FEW: usize = 32;
+    let (total, free) = whole(moments, pure);
+    let of = |(v, variant): (usize, &Variant)| {
         let block = moments.block(first + v, variant.columns.start);
         let q = block.rank();
-        let dof = free - (q + n_scanned) as f64;
+        let dof = free - (q + n_scanned(candidate)) as f64;
         if q == 0 || dof < 1.0 {
-            scan.push(0.0);
-            ln_left.push(f64::INFINITY);
-            continue;
+            return None;
         }
         let along = block.whitener.tr_mul(&moments.jr.rows(variant.columns.start, variant.columns.len()));
         // rounding may take away more than there is
-        let delta = along.norm_squared().min(moments.rr);
-        let ln_p = ln_p_of_f(delta, q as f64, held_against(pure, total - delta, dof), dof);
-        scan.push(delta);
-        ln_left.push(block.ln_det());
-        ln_each.push(ln_p);
-        // of values that these touches cannot tell apart the first stands, and not the one that rounding favours
-        const ROUNDING: f64 = 1e-9;
-        if best.as_ref().is_none_or(|b| ln_p < b.3 - ROUNDING * b.3.abs().max(1.0)) {
-            best = Some((v, block, along, ln_p));
-        }
-    }
-    let Some((variant, block, along, ln_best)) = best else {
+        let delta_ss = along.norm_squared().min(moments.rr);
+        let ln_p = ln_p_of_f(delta_ss, q as f64, held_against(pure, total - delta_ss, dof), dof);
+        Some(Taken { block, along, delta_ss, ln_p })
+    };
+    candidate.variants.par_iter().enumerate().with_min_len(FEW).map(of).collect()
+}
+
+/// The variant that fits best.
+fn best(each: &[Option<Taken>]) -> Option<usize> {
+    // of values that these touches cannot tell apart the first stands, and not the one that rounding favours
+    const ROUNDING: f64 = 1e-9;
+    let seen = each.iter().enumerate().filter_map(|(v, taken)| Some((v, taken.as_ref()?.ln_p)));
+    let better = |best: (usize, f64), next: (usize, f64)| {
+        if next.1 < best.1 - ROUNDING * best.1.abs().max(1.0) { next } else { best }
+    };
+    seen.reduce(better).map(|(variant, _)| variant)
+}
+
+/// The variant of a library's only candidate that fits best, and what it takes away.
+#[must_use]
+pub fn best_variant(question: Question, library: &Library) -> Option<(usize, f64)> {
+    let moments = Moments::new(question.residual, question.base, library);
+    let each = taken(&moments, library.candidates().first()?, question.pure, 0);
+    let variant = best(&each)?;
+    Some((variant, each[variant].as_ref()?.delta_ss))
+}
+
+/// The score test of a candidate; its variants are those from `first` on.
+fn score_of(moments: &Moments, library: &Library, pure: Option<PureError>, (c, first): (usize, usize)) -> Score {
+    let (total, free) = whole(moments, pure);
+    let candidate = &library.candidates()[c];
+    let n_scanned = n_scanned(candidate);
+    let mut each = taken(moments, candidate, pure, first);
+    let scan = each.iter().map(|t| t.as_ref().map_or(0.0, |t| t.delta_ss)).collect();
+    let ln_left = each.iter().map(|t| t.as_ref().map_or(f64::INFINITY, |t| t.block.ln_det())).collect();
+    let ln_each: Vec<f64> = each.iter().flatten().map(|t| t.ln_p).collect();
+    let best = best(&each).and_then(|variant| Some((variant, each[variant].take()?)));
+    let Some((variant, Taken { block, along, delta_ss, ln_p: ln_best })) = best else {
         let m = candidate.variants[0].columns.len();
         return Score {
             candidate: c,
@@ -266,7 +304,6 @@ fn score_of(moments: &Moments, library: &Library, pure: Option<PureError>, (c, f
         };
     };
     let q = block.rank();
-    let delta_ss = along.norm_squared().min(moments.rr);
     let dof = free - (q + n_scanned) as f64;
     let rest = held_against(pure, total - delta_ss, dof);
     let variance = rest / dof;
