@@ -71,6 +71,12 @@ pub fn chi2_quantile(p: f64, dof: f64) -> Option<f64> {
     quantile(&Gamma::new(0.5 * dof, 0.5).ok()?, p, dof)
 }
 
+/// The z with P(Z ≤ z) = p of a normal value.
+#[must_use]
+pub fn normal_quantile(p: f64) -> Option<f64> {
+    (0.0..=1.0).contains(&p).then(|| Normal::standard().inverse_cdf(p)).and_then(number)
+}
+
 /// Newton's steps from the approximation of Wilson and Hilferty, within what is known to bracket the quantile: fewer steps than the
 /// library's. Where they do not end, the library's.
 fn quantile(of: &Gamma, p: f64, dof: f64) -> Option<f64> {

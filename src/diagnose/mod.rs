@@ -384,6 +384,9 @@ fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagno
     let fit = identify_data(machine, catalogue, subject.fit.data.clone(), &settings)?;
     let features = Arc::new(features::features(&fit, machine));
     let found = Regression::new(&fit, machine, catalogue, &features);
+    if !could_explain(&fit, &found) {
+        return Ok(None);
+    }
     let tested = Tested::new(Subject { settings: &settings, fit: &fit, ..subject }, &found, &features, options)?;
     // most of the answer is worked out only where it can be one
     if !tested.may_explain() {
@@ -409,11 +412,24 @@ fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagno
     Ok(Some(answer))
 }
 
+/// Is there an effect, or a pair that would be named together, that may bring the error down to the noise? As linear tests have it:
+/// a refit may find a better value of a shape, and with it explain a little more.
+fn could_explain(fit: &Fit, found: &Regression) -> bool {
+    /// Part of the residual by which a refit may explain more than the tests.
+    const MORE: f64 = 0.05;
+    let question = found.evidence.question();
+    let search = Search::new(question, &found.named.library);
+    let gained = search.scores.iter().map(|s| s.delta_ss).fold(pairs::gained(&search), f64::max);
+    let all = lack_of_fit(&question).ss;
+    (1.0 - MORE) * all - gained <= TIMES_NOISE.powi(2) * fit.n_used() as f64
+}
+
+/// An error that comes down to so many times the noise is explained.
+const TIMES_NOISE: f64 = 1.25;
+
 /// Does an error that is left come down to the noise of a fit?
 fn explains(fit: &Fit, rms_um: f64) -> bool {
-    /// To so many times the noise.
-    const TIMES: f64 = 1.25;
-    rms_um <= TIMES * noise_um(fit)
+    rms_um <= TIMES_NOISE * noise_um(fit)
 }
 
 /// The fit with further effects.

@@ -21,7 +21,7 @@ pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision, ge
         return None;
     }
     let search = &seen.search;
-    let among: Vec<usize> = search.groups(AMONG).iter().map(Group::first).collect();
+    let among = among(search);
     let best = among.iter().map(|&c| search.bic(c)).fold(f64::INFINITY, f64::min);
     let pair = search.best_pair(&among).filter(|pair| pair.bic < best - CLEARLY)?;
     if decision.confirmed {
@@ -52,6 +52,16 @@ pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision, ge
     library.push("both", Origin::Catalogue, &joint);
     let held = held_out(search.question, &library, &seen.evidence.visits, Choice::Given(0));
     bears_out(&held).then_some(pair)
+}
+
+/// Candidates that are paired.
+fn among(search: &Search) -> Vec<usize> {
+    search.groups(AMONG).iter().map(Group::first).collect()
+}
+
+/// What the best pair takes away by the tests, 0 where there is none.
+pub(super) fn gained(search: &Search) -> f64 {
+    search.best_pair(&among(search)).map_or(0.0, |pair| pair.delta_ss)
 }
 
 /// Does the noise explain what a fit with these effects leaves?

@@ -39,9 +39,14 @@ pub(super) struct Regression<'c> {
 
 impl<'c> Regression<'c> {
     pub fn new(fit: &Fit, machine: &Machine, catalogue: &'c Catalogue, features: &Arc<Features>) -> Self {
-        let first = calm(fit, machine, catalogue, features).unwrap_or_else(|| Evidence::from_fit(fit));
-        let (named, generics) =
-            rayon::join(|| Named::for_fit(fit, &first, machine, catalogue), || features::shapes(&first, features));
+        let of = |first: &Evidence| {
+            rayon::join(|| Named::for_fit(fit, first, machine, catalogue), || features::shapes(first, features))
+        };
+        let (first, (named, generics)) = calm(fit, machine, &of).unwrap_or_else(|| {
+            let first = Evidence::from_fit(fit);
+            let candidates = of(&first);
+            (first, candidates)
+        });
         let Some(scatter) = estimated(fit, machine, &first, &named, &generics) else {
             return Self { evidence: first, named, generics, order_mm: None, ordered: OnceLock::new() };
         };
@@ -114,10 +119,14 @@ fn known_beforehand(tau_mm: f64, declared_mm: f64) -> f64 {
     2.0 * (tau_mm / declared_mm - 1.0).powi(2)
 }
 
-/// The evidence with the declared scatter of visits, where revisits show far more than that and a few effects or shapes
+/// The evidence and the candidates with the declared scatter of visits, where revisits show far more than that and a few effects or shapes
 /// explain all of it: what drifts or jumps between two visits of one pose looks like scatter of the visits, and would
 /// widen the tests until they are blind to it. Scatter that nothing explains stays scatter.
-fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Arc<Features>) -> Option<Evidence> {
+fn calm<'c>(
+    fit: &Fit,
+    machine: &Machine,
+    of: &dyn Fn(&Evidence) -> (Named<'c>, Generics),
+) -> Option<(Evidence, (Named<'c>, Generics))> {
     const AT_MOST: usize = 4;
     let declared_mm = declared_tau_mm(machine, &fit.data.observations);
     // more than declared as estimated, not as its upper bound only: scatter as it is declared is no reason to look twice
@@ -125,9 +134,10 @@ fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Arc<Feat
         return None;
     }
     let evidence = Evidence::with_visits(fit, declared_mm);
-    let mut library = Named::for_fit(fit, &evidence, machine, catalogue).library;
+    let (named, generics) = of(&evidence);
     // groups of visits are the scatter itself
-    library.append(features::shapes(&evidence, features).without("visit"));
+    let mut library = named.library.clone();
+    library.append(generics.without("visit"));
     let question = evidence.question();
     let (mut basis, mut residual) = (question.base.clone(), question.base.project(question.residual));
     for _ in 0..AT_MOST {
@@ -139,7 +149,7 @@ fn calm(fit: &Fit, machine: &Machine, catalogue: &Catalogue, features: &Arc<Feat
         }
         residual = basis.project(&residual);
         if lack_of_fit(&Question { residual: &residual, base: &basis, ..question }).p > 0.05 {
-            return Some(evidence);
+            return Some((evidence, (named, generics)));
         }
     }
     None

@@ -1,6 +1,6 @@
 //! Probabilities of the tests, also where they are too small for a floating-point number.
 
-use crate::probability::{beta_reg, chi2_quantile, chi2_sf, ln_beta, ln_gamma, t_sf};
+use crate::probability::{beta_reg, chi2_quantile, chi2_sf, ln_beta, ln_gamma, normal_quantile, t_sf};
 
 /// Below this a regularised incomplete beta function is computed by its series in logarithms.
 const SMALLEST: f64 = 1e-250;
@@ -75,13 +75,7 @@ pub fn ln_p_of_scan(ln_p: &[f64], q: usize) -> f64 {
     if q == 0 {
         return bonferroni.min(0.0);
     }
-    let root = |ln_p: f64| -> f64 {
-        let p = ln_p.exp();
-        // a p that is no number stands for no effect
-        let quantile = || chi2_quantile(1.0 - p, q as f64).unwrap_or(0.0).max(0.0).sqrt();
-        if p <= 1e-12 { tail_root(ln_p, q) } else { quantile() }
-    };
-    let roots: Vec<f64> = ln_p.iter().map(|&l| root(l)).collect();
+    let roots: Vec<f64> = ln_p.iter().map(|&ln_p| root(ln_p, q)).collect();
     let variation: f64 = roots.windows(2).map(|w| (w[1] - w[0]).abs()).sum();
     let top = roots.iter().copied().fold(0.0, f64::max);
     let half_q = 0.5 * q as f64;
@@ -92,6 +86,18 @@ pub fn ln_p_of_scan(ln_p: &[f64], q: usize) -> f64 {
             - ln_gamma(half_q))
         .exp();
     bonferroni.min((best.exp() + crossings).ln()).min(0.0)
+}
+
+/// √S with ln P(χ²_q > S) = `ln_p`; 0 where that is no number: it stands for no effect.
+fn root(ln_p: f64, q: usize) -> f64 {
+    let p = ln_p.exp();
+    match q {
+        1 => normal_quantile(0.5 * p).map_or(0.0, f64::abs),
+        // P(χ² > S) = e^(−S/2)
+        2 => (-2.0 * ln_p).max(0.0).sqrt(),
+        _ if p <= 1e-12 => tail_root(ln_p, q),
+        _ => chi2_quantile(1.0 - p, q as f64).unwrap_or(0.0).max(0.0).sqrt(),
+    }
 }
 
 /// √S with ln P(χ²_q > S) = `ln_p`, for small p: Newton's steps on the leading term of the tail.
@@ -148,6 +154,17 @@ mod tests {
                 assert!((tail_root(p.ln(), q) - exact).abs() < 0.02 * exact, "{q} {p}");
             }
         }
+    }
+
+    #[test]
+    fn roots_have_their_probability_whatever_the_number_of_columns() {
+        for q in [1, 2, 3] {
+            for p in [0.9f64, 0.3, 1e-3, 1e-8] {
+                let root = root(p.ln(), q);
+                assert!((p_of_chi2(root * root, q as f64) / p - 1.0).abs() < 1e-6, "{q} {p}: {root}");
+            }
+        }
+        assert_eq!((root(f64::NAN, 1), root(f64::NAN, 2), root(0.0, 1)), (0.0, 0.0, 0.0));
     }
 
     #[test]

@@ -172,6 +172,58 @@ struct Result {
     before: f64,
 }
 
+/// What a group of touches bears of the directions of a base: QᵀQ of the training set is the identity less the group's.
+struct Borne {
+    /// Directions of which the group bears something, p × m, orthonormal.
+    directions: DMatrix<f64>,
+    /// Share of each that is left to the training set; 0 where it is lost.
+    left: Vec<f64>,
+}
+
+impl Borne {
+    /// Of the group's rows of the basis, p × group; by whichever of the two products is the smaller.
+    fn new(q_g: &DMatrix<f64>) -> Self {
+        /// A share that is no more than rounding.
+        const NOTHING: f64 = 1e-12;
+        let (p, n) = q_g.shape();
+        if p == 0 {
+            return Self { directions: DMatrix::zeros(0, 0), left: Vec::new() };
+        }
+        let product = if n < p { q_g.tr_mul(q_g) } else { q_g * q_g.transpose() };
+        let eigen = product.symmetric_eigen();
+        let borne: Vec<usize> = (0..eigen.eigenvalues.len()).filter(|&i| eigen.eigenvalues[i] > NOTHING).collect();
+        let mut directions = eigen.eigenvectors.select_columns(&borne);
+        if n < p {
+            directions = q_g * directions;
+            for (mut direction, &i) in directions.column_iter_mut().zip(&borne) {
+                direction /= eigen.eigenvalues[i].sqrt();
+            }
+        }
+        let left = borne.iter().map(|&i| 1.0 - eigen.eigenvalues[i]).map(|left| if left > LOST { left } else { 0.0 });
+        Self { directions, left: left.collect() }
+    }
+
+    /// Coordinates in the basis as those in one that the training set makes orthonormal; nothing along what is lost.
+    fn orthonormal_again(&self, mut x: DMatrix<f64>) -> DMatrix<f64> {
+        let mut along = self.directions.tr_mul(&x);
+        for (mut row, left) in along.row_iter_mut().zip(&self.left) {
+            row *= if *left > 0.0 { left.sqrt().recip() - 1.0 } else { -1.0 };
+        }
+        x.gemm(1.0, &self.directions, &along, 1.0);
+        x
+    }
+
+    /// Coordinates along what is lost.
+    fn lost(&self, x: &DMatrix<f64>) -> DMatrix<f64> {
+        let lost: Vec<usize> = (0..self.left.len()).filter(|&i| self.left[i] == 0.0).collect();
+        self.directions.select_columns(&lost).tr_mul(x)
+    }
+
+    fn n_lost(&self) -> usize {
+        self.left.iter().filter(|left| **left == 0.0).count()
+    }
+}
+
 /// One group left out: the training set as whole less group, in the coordinates of the full basis.
 fn fold(
     question: Question,
@@ -188,22 +240,11 @@ fn fold(
     let j_g = library.at_rows(rows);
     let r_g = DVector::from_iterator(rows.len(), rows.iter().map(|&i| residual[i]));
 
-    // QᵀQ of the training set is the identity less the group's; its square root makes the basis orthonormal again
-    let information = DMatrix::identity(p, p) - &q_g * q_g.transpose();
-    let (into, lost) = if p == 0 {
-        (DMatrix::zeros(0, 0), DMatrix::zeros(0, 0))
-    } else {
-        let eigen = information.symmetric_eigen();
-        let (seen, gone): (Vec<usize>, Vec<usize>) = (0..p).partition(|&i| eigen.eigenvalues[i] > LOST);
-        let mut into = eigen.eigenvectors.select_columns(&seen).transpose();
-        for (mut row, &i) in into.row_iter_mut().zip(&seen) {
-            row /= eigen.eigenvalues[i].sqrt();
-        }
-        (into, eigen.eigenvectors.select_columns(&gone).transpose())
-    };
+    let group_bears = Borne::new(&q_g);
+    let into = |x: DMatrix<f64>| group_bears.orthonormal_again(x);
     // the projected residual has QᵀR = 0 as a whole
-    let qr = -(&into * (&q_g * &r_g));
-    let qj = &into * (&whole.qj - &q_g * &j_g);
+    let qr = -into(DMatrix::from_columns(&[&q_g * &r_g])).column(0);
+    let qj = into(&whole.qj - &q_g * &j_g);
     let rr = whole.rr - r_g.norm_squared() - qr.norm_squared();
     let jr = &whole.jr - j_g.tr_mul(&r_g) - qj.tr_mul(&qr);
     let blocks: Vec<DMatrix<f64>> = library
@@ -216,7 +257,7 @@ fn fold(
             block - part.transpose() * part
         })
         .collect();
-    let training = Moments { n: whole.n - rows.len(), p: into.nrows(), rr: rr.max(0.0), jr, qj, blocks };
+    let training = Moments { n: whole.n - rows.len(), p: p - group_bears.n_lost(), rr: rr.max(0.0), jr, qj, blocks };
     let scores = score(&training, library, question.pure);
     let chosen = match choice {
         // a training set that cannot separate the leader of all touches from its rival chooses the same
@@ -230,8 +271,8 @@ fn fold(
     };
 
     // each touch of the group in the training basis: prediction r̂ = −… of the residual, and its variance
-    let seen_g = &into * &q_g;
-    let lost_g = &lost * &q_g;
+    let lost_g = group_bears.lost(&q_g);
+    let seen_g = into(q_g);
     let known: Vec<bool> = (0..rows.len())
         .map(|i| lost_g.column(i).norm_squared() < 1e-12 && seen_g.column(i).norm_squared() < LARGEST_VARIANCE)
         .collect();

@@ -130,7 +130,7 @@ impl Moments {
         // most candidates are of one column
         match raw.as_slice() {
             [raw] => Block::of_one(*raw, raw - w.iter().map(|w| w * w).sum::<f64>()),
-            _ => Block::new(raw, &(raw - w.transpose() * w)),
+            _ => Block::new(raw, &(raw - w.tr_mul(&w))),
         }
     }
 }
