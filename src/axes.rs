@@ -55,24 +55,12 @@ impl AxisName {
     pub fn fill_in(self, text: &str) -> String {
         let own = self.index() % 3;
         let order: Vec<usize> = [own].into_iter().chain((0..3).filter(|i| *i != own)).collect();
-        let meant = |written: char| {
-            let from = Self::ALL.iter().position(|axis| axis.letter() == written.to_ascii_uppercase())?;
-            let to = Self::ALL[order[from % 3] + from / 3 * 3].letter();
-            Some(if written.is_ascii_lowercase() { to.to_ascii_lowercase() } else { to })
-        };
-        let mut parts = text.split('{');
-        let mut out = parts.next().unwrap_or_default().to_owned();
-        for part in parts {
-            let mut letters = part.chars();
-            match (letters.next().and_then(meant), letters.next()) {
-                (Some(letter), Some('}')) => {
-                    out.push(letter);
-                    out.push_str(letters.as_str());
-                }
-                _ => {
-                    out.push('{');
-                    out.push_str(part);
-                }
+        let mut out = text.to_owned();
+        for (written, meant) in order.into_iter().enumerate() {
+            for kind in [0, 3] {
+                let (from, to) = (Self::ALL[written + kind].letter(), Self::ALL[meant + kind].letter());
+                out = out.replace(&format!("{{{from}}}"), &to.to_string());
+                out = out.replace(&format!("{{{}}}", from.to_ascii_lowercase()), &to.to_ascii_lowercase().to_string());
             }
         }
         out

@@ -3,7 +3,6 @@
 use super::common::of_fit;
 use super::{Answer, Io};
 use crate::diag::Result;
-use crate::fit::Settings;
 use crate::workflow::load_study;
 use crate::{files, report};
 use std::path::PathBuf;
@@ -27,7 +26,7 @@ pub struct Args {
 /// When the study or a file that it names is unusable, or the CSV cannot be written.
 pub fn run(args: &Args, io: &Io) -> Result<Answer> {
     let loaded = load_study(&args.study, io)?;
-    let fit = loaded.fit(&Settings { without_unmodelled: true, ..loaded.settings() })?;
+    let fit = loaded.fit(&loaded.settings())?;
     let (comparison, found) = loaded.compare(&fit)?;
     if let Some(path) = &args.csv {
         files::write_whole(path, report::compare::csv(&comparison).as_bytes())?;

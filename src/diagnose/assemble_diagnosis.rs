@@ -52,8 +52,7 @@ pub(super) fn put_together(
         decided = Decided::MissingEffect;
         candidates.push(candidate);
     }
-    let is_listed = options.lists() || decision.confirmed;
-    if decided != Decided::TooFewTouches && is_listed {
+    if decided != Decided::TooFewTouches {
         let first_order = FirstOrder::from_fit(fit);
         let tell_apart = separating_touches::words(subject, seen, options);
         candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, told))| Candidate {
@@ -62,7 +61,7 @@ pub(super) fn put_together(
             ..candidate(fit, seen, &first_order, group, (i == 0, decision.confirmed))
         }));
     }
-    candidates.truncate(options.at_most.max(1));
+    candidates.truncate(options.at_most);
     super::turning_points::say(subject, &mut candidates);
     let found: Vec<&Group> = seen
         .groups
@@ -220,7 +219,6 @@ pub(super) fn put_together(
         sketchable,
     };
     let verdict = findings.verdict(decided);
-    let model = if options.lists() { seen.folds(fit).model() } else { None };
     jump_of_what(seen, features, &mut candidates);
     let needs_temperature = without_temperature(fit, seen);
     room_or_time(fit, seen, &mut candidates);
@@ -231,8 +229,8 @@ pub(super) fn put_together(
         consequences: Vec::new(),
         oversized: Vec::new(),
         rms_um: fit.outcome.rms_um,
-        held_out_rms_um: model.map(|h| h.rms_um),
-        held_out_se_um: model.and_then(|h| h.standard_error_um),
+        held_out_rms_um: seen.folds.model().map(|h| h.rms_um),
+        held_out_se_um: seen.folds.model().and_then(|h| h.standard_error_um),
         all_touches: None,
         noise_um: noise_um(fit),
         visit_um: um_from_mm(seen.evidence.tau_mm),
@@ -422,12 +420,11 @@ fn candidate(
     let both = seen.both.filter(|_| first);
     let p_adjusted = tests().map(|s| s.p_adjusted).chain(both.map(|b| b.p_adjusted)).fold(1.0, f64::min);
     let effect = seen.named.effects[chosen];
-    let folds = seen.folds(fit);
     let held = match seen.nested.as_ref().filter(|_| first && both.is_none()) {
-        Some(nested) => folds.chosen(seen.evidence, seen.named, nested),
-        None => folds.given(seen.evidence, seen.named, chosen),
+        Some(nested) => seen.folds.chosen(seen.evidence, seen.named, nested),
+        None => seen.folds.given(seen.evidence, seen.named, chosen),
     };
-    let errors = folds.errors(&held);
+    let errors = seen.folds.errors(&held);
     let told = told(&score.covariance);
     // an order that leaves out the scatter of visits says nothing of the doubt: that is with it
     let tested = &seen.search.scores[chosen];

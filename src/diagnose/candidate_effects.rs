@@ -178,8 +178,8 @@ impl Maker<'_> {
         Tried { value: shape.map_or(0.0, |(_, value)| value), white }
     }
 
-    /// Which of the values of effect number i explains most, and how much.
-    fn best_of(&self, (i, which): (usize, usize), tried: &[Tried]) -> Option<(usize, f64)> {
+    /// Which of the values of effect number i explains most, and how much: nothing where the touches see none.
+    fn best_of(&self, (i, which): (usize, usize), tried: &[Tried]) -> (usize, f64) {
         let n = self.source.sizes(i).count();
         let n_rows = self.evidence.n_rows();
         let mut library = if Library::keeps(n_rows) {
@@ -194,7 +194,7 @@ impl Maker<'_> {
         };
         let variant = |(k, t): (usize, &Tried)| search::Variant { shape: t.value, columns: k * n..(k + 1) * n };
         library.place("tried", Origin::Catalogue, tried.iter().enumerate().map(variant).collect(), 1);
-        search::best_variant(self.evidence.question(), &library)
+        search::best_variant(self.evidence.question(), &library).unwrap_or((0, 0.0))
     }
 
     /// An effect at all values of its scan, and at a better one beside the best of them: a jump that was tried between index
@@ -205,14 +205,14 @@ impl Maker<'_> {
             values.par_iter().map(|value| self.make(i, Some((which, *value)))).collect()
         };
         let mut kept = make_all(&values);
-        let Some(coarse) = self.best_of((i, which), &kept) else { return kept };
+        let coarse = self.best_of((i, which), &kept);
         let shape = effect.parameters.iter().filter(|p| p.shape.is_some()).nth(which);
         let Some(shape) = shape else { return kept };
         let mut best = (values[coarse.0], coarse.1, None);
         let try_also = |more: &[f64], best: (f64, f64, Option<Tried>)| {
             let mut made = make_all(more);
             match self.best_of((i, which), &made) {
-                Some((at, gain)) if gain > best.1 => (more[at], gain, Some(made.swap_remove(at))),
+                (at, gain) if gain > best.1 => (more[at], gain, Some(made.swap_remove(at))),
                 _ => best,
             }
         };
@@ -300,8 +300,7 @@ impl<'c> Named<'c> {
         };
         let each = || tried.iter().enumerate().flat_map(|(i, (which, all))| all.iter().map(move |t| (i, *which, t)));
         let mut library = if kept {
-            let parts: Vec<Arc<Vec<f64>>> = tried.iter().flat_map(|(_, all)| all).map(|t| t.white.clone()).collect();
-            Library::joined(evidence.n_rows(), &parts)
+            Library::joined(evidence.n_rows(), tried.iter().flat_map(|(_, all)| all).map(|t| &*t.white))
         } else {
             let all: Vec<(Chosen, usize)> = each().flat_map(|(i, which, t)| chosen(i, which, t)).collect();
             Library::made(evidence.n_rows(), all.len(), source.make(all))

@@ -75,7 +75,7 @@ impl Folds {
                 .flat_map(|&c| (0..named.library.candidates()[c].variants.len()).map(move |variant| (c, variant)));
             let raw = named.raw_um(&all.collect::<Vec<_>>());
             let white: Vec<DMatrix<f64>> = raw.into_iter().map(|um| own.whiten(um.map(mm_from_um))).collect();
-            library = library.with_variants(own.n_rows(), &white);
+            library = library.with_variants(own.n_rows(), white);
         }
         let own = self.otherwise.as_ref().unwrap_or(evidence);
         held_out_in(own.question(), &library, &own.visits, choice, &self.colours)

@@ -52,7 +52,7 @@ use candidate_effects::Named;
 use evidence::Evidence;
 pub use first_order::taken_away_um;
 use nalgebra::DMatrix;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 pub use verdict::Verdict;
 use visit_scatter::Regression;
 
@@ -70,8 +70,7 @@ pub struct Subject<'a> {
 /// How much is worked out.
 #[derive(Debug, Clone, Copy)]
 pub struct Options<'a> {
-    /// Most candidates that are listed. 0: what goes with the effects that are not named is left out, for who asks on what the
-    /// residual depends.
+    /// Most candidates that are listed.
     pub at_most: usize,
     /// Refit with the first candidate: what remains, and which outliers come back.
     pub refit: bool,
@@ -88,15 +87,8 @@ impl Default for Options<'_> {
     }
 }
 
-impl Options<'_> {
-    /// Are effects listed that are not named?
-    fn lists(&self) -> bool {
-        self.at_most > 0
-    }
-}
-
 /// Everything that the answer is made from.
-pub struct Examination<'a> {
+pub(crate) struct Examination<'a> {
     /// The regression.
     pub evidence: &'a Evidence,
     /// Effects with a name.
@@ -105,30 +97,26 @@ pub struct Examination<'a> {
     pub search: Search<'a>,
     /// The same for sizes and order, where no test passes: with the scatter that is left with the most likely effect.
     ordered: Option<Search<'a>>,
-    /// What these touches cannot tell apart, best first; nothing where no test passes and none are listed.
+    /// What these touches cannot tell apart, best first.
     pub groups: Vec<Group>,
     /// On what the misfit depends, best first.
     pub dependences: Vec<Dependence>,
     /// Against pure error.
     pub lack_of_fit: LackOfFit,
-    /// Where a test passes: the choice redone without the touches that judge it ...
+    /// Where a test passes: what the touches of each index visit say of the choice that is made without them.
     pub nested: Option<HeldOut>,
-    /// ... or, where that bears nothing out, the first finding behind it that held-out touches bear out by itself.
+    /// They do not bear that out, and `nested` is of the first finding behind it that they do bear out by itself.
     pub given: bool,
     /// Two effects that are named together.
     pub both: Option<Pair>,
-    folds: OnceLock<folds::Folds>,
+    /// What cross-validated errors are worked out from.
+    pub folds: folds::Folds,
 }
 
 impl<'a> Examination<'a> {
     /// The tests that sizes and order are of.
     fn order(&self) -> &Search<'a> {
         self.ordered.as_ref().unwrap_or(&self.search)
-    }
-
-    /// What cross-validated errors are worked out from.
-    fn folds(&self, fit: &Fit) -> &folds::Folds {
-        self.folds.get_or_init(|| folds::Folds::new(fit, self.evidence))
     }
 
     /// What the sizes of a candidate do before whitening, µm per typical size, with the shape that fits best.
@@ -144,15 +132,15 @@ impl<'a> Examination<'a> {
 }
 
 /// The tests of a fit without the answer in words.
-fn examine<'a>(fit: &Fit, found: &'a Regression<'a>, features: &Features, options: &Options) -> Examination<'a> {
+fn examine<'a>(fit: &Fit, found: &'a Regression<'a>, features: &Features, at_most: usize) -> Examination<'a> {
     let Regression { evidence, named, generics, .. } = found;
     let question = evidence.question();
     let (search, dependences) =
         rayon::join(|| Search::new(question, &named.library), || dependences(question, features, generics));
     let passes = search.leader().is_some();
-    let ordered = if options.lists() && !passes { found.search_for_order(fit) } else { None };
+    let ordered = if passes { None } else { found.search_for_order(fit) };
     let order = ordered.as_ref().unwrap_or(&search);
-    let mut groups = if options.lists() || passes { order.groups(options.at_most.max(1)) } else { Vec::new() };
+    let mut groups = order.groups(at_most);
     let nested = passes.then(|| search.held_out(&evidence.visits, Choice::Redone));
     groups.iter_mut().for_each(|group| without_needless_incidents(group, named));
     let behind = nested.as_ref().and_then(|nested| borne_out_behind(&mut groups, &search, &evidence.visits, nested));
@@ -164,7 +152,7 @@ fn examine<'a>(fit: &Fit, found: &'a Regression<'a>, features: &Features, option
         given: behind.is_some(),
         nested: behind.or(nested),
         both: None,
-        folds: OnceLock::new(),
+        folds: folds::Folds::new(fit, evidence),
         evidence,
         named,
         search,
@@ -276,7 +264,7 @@ impl<'a> Tested<'a> {
     ) -> Result<Self> {
         let Subject { machine, fit, .. } = subject;
         let Regression { evidence, named, generics, .. } = found;
-        let mut seen = examine(fit, found, features, options);
+        let mut seen = examine(fit, found, features, options.at_most);
         let weighed = match seen.groups.first().filter(|_| seen.nested.is_some()) {
             Some(group) => effects_versus_patterns::weigh(evidence.question(), &named.library, generics, group.first()),
             None => effects_versus_patterns::Weighed::default(),
@@ -290,10 +278,7 @@ impl<'a> Tested<'a> {
         };
         let mut decision = decide::decide(&seen, &beside);
         if let Some(pair) = pairs::both(subject, &seen, &decision, generics) {
-            if seen.nested.is_none() && !options.lists() {
-                seen.ordered = found.search_for_order(fit);
-            }
-            pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most.max(1));
+            pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most);
             seen.groups.iter_mut().for_each(|group| without_needless_incidents(group, named));
             (seen.both, seen.given) = (Some(pair), true);
             (beside.shapes_win, beside.better) = (false, None);
@@ -341,7 +326,7 @@ impl<'a> Tested<'a> {
             || assemble_diagnosis::put_together(subject, &seen, features, (decision, &beside), gross, options),
             || refitted.as_ref().map(|again| still_fails(again, machine, catalogue)),
         );
-        if out.mistake().is_none() && options.lists() {
+        if out.mistake().is_none() {
             let gathered = beside.gathered.is_some();
             out.consequences = consequence::consequences(subject, &seen, generics, (&out.verdict, gathered))?;
         }
@@ -384,7 +369,8 @@ fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagno
     let fit = identify_data(machine, catalogue, subject.fit.data.clone(), &settings)?;
     let features = Arc::new(features::features(&fit, machine));
     let found = Regression::new(&fit, machine, catalogue, &features);
-    if !could_explain(&fit, &found) {
+    // a set-up mistake is no effect of the catalogue, and is tried where the error is gross
+    if fit.outcome.rms_um <= setup_mistakes::GROSS_UM && !could_explain(&found) {
         return Ok(None);
     }
     let tested = Tested::new(Subject { settings: &settings, fit: &fit, ..subject }, &found, &features, options)?;
@@ -412,16 +398,23 @@ fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagno
     Ok(Some(answer))
 }
 
-/// Is there an effect, or a pair that would be named together, that may bring the error down to the noise? As linear tests have it:
-/// a refit may find a better value of a shape, and with it explain a little more.
-fn could_explain(fit: &Fit, found: &Regression) -> bool {
-    /// Part of the residual by which a refit may explain more than the tests.
+/// Is there an effect, or a pair that would be named together, that may bring the error down to the noise? Linear tests say so but for
+/// shapes: a refit may find a better value than those of the scan, and may change shapes that are not scanned.
+fn could_explain(found: &Regression) -> bool {
+    /// Part of the residual by which a better value of a scanned shape may explain more.
     const MORE: f64 = 0.05;
-    let question = found.evidence.question();
-    let search = Search::new(question, &found.named.library);
+    let Regression { evidence, named, .. } = found;
+    let question = evidence.question();
+    let search = Search::new(question, &named.library);
+    let has_other_shapes = |c: usize| {
+        let shapes = named.effects[c].parameters.iter().filter(|p| p.shape.is_some()).count();
+        shapes > usize::from(named.scanned[c].is_some())
+    };
+    if search.scores.iter().any(|s| s.proposed() && has_other_shapes(s.candidate)) {
+        return true;
+    }
     let gained = search.scores.iter().map(|s| s.delta_ss).fold(pairs::gained(&search), f64::max);
-    let all = lack_of_fit(&question).ss;
-    (1.0 - MORE) * all - gained <= TIMES_NOISE.powi(2) * fit.n_used() as f64
+    (1.0 - MORE) * lack_of_fit(&question).ss - gained <= TIMES_NOISE.powi(2) * question.residual.len() as f64
 }
 
 /// An error that comes down to so many times the noise is explained.

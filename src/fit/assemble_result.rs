@@ -129,7 +129,7 @@ pub(super) fn assemble_result(
         parameters,
         warnings: Vec::new(),
     };
-    remarks.extend(of_the_fit(fit, asked, solution, &evidence.moves));
+    remarks.extend(of_the_fit(fit, asked, solution));
     remarks.extend(of_shapes(&evidence, &status));
     remarks.extend(type_b.iter().filter_map(|b| b.remark.clone()));
     remarks.extend(evidence.unmodelled.iter().flat_map(|all| all.left_out.clone()).map(Remark::NotCounted));
@@ -450,7 +450,7 @@ fn not_mentioned(outcome: &Outcome, remarks: &[Remark]) -> Option<Remark> {
 }
 
 /// What is to be remarked on data, noise, outliers and misfit.
-fn of_the_fit(fit: &Fit, asked: &Asked, solution: &Solution, moves: &DVector<f64>) -> Vec<Remark> {
+fn of_the_fit(fit: &Fit, asked: &Asked, solution: &Solution) -> Vec<Remark> {
     let (effects, settings) = (asked.effects, &asked.search.settings);
     let mut out = Vec::new();
     if fit.data.observations.iter().all(|o| !o.has_temperature) {
@@ -460,6 +460,7 @@ fn of_the_fit(fit: &Fit, asked: &Asked, solution: &Solution, moves: &DVector<f64
     out.extend(fit.data.temperature_gap.map(Remark::TemperatureGap));
     let far = fit.free.iter().filter(|&&i| is_far(fit, i));
     out.extend(far.map(|&i| Remark::NotCredible { name: fit.model.unknowns[i].name.clone(), times: NOT_CREDIBLE }));
+    let moves = uncertainty::moves_with_unseen(fit);
     for (c, &i) in fit.free.iter().enumerate() {
         let is_straight = fit.observability.unseen.iter().all(|v| v[c].abs() <= 1e-6);
         let u = &fit.model.unknowns[i];

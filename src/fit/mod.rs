@@ -146,7 +146,7 @@ fn identify_from(
     let is_small = fit.data.observations.len() <= uncertainty::MOST_UNMODELLED;
     let type_b = type_b::type_b(&fit, machine, catalogue, &settings.type_b)?;
     fit.type_b = type_b.iter().map(|b| b.makes.clone()).collect();
-    let with_catalogue = !settings.quick && !settings.bare && !settings.without_unmodelled && is_small;
+    let with_catalogue = !settings.quick && !settings.bare && is_small;
     let left_out = with_catalogue.then(|| uncertainty::LeftOut::new(&fit.model, machine, catalogue, &fit.data));
     let asked = Asked { machine, effects, search };
     let solved = (&found.solution, found.condition);

@@ -55,8 +55,6 @@ pub struct Settings {
     pub masked: Vec<Mask>,
     /// Without the figures that need the whole catalogue: what unmodelled effects may add, weak combinations, held-out errors.
     pub bare: bool,
-    /// Without what unmodelled effects may add: for who asks how a model fits and not how certain its parameters are.
-    pub without_unmodelled: bool,
     /// For trial fits: as `bare`, and without the intervals of shape parameters. What hangs on a shape that is not told may then be
     /// called identified.
     pub quick: bool,

@@ -101,10 +101,6 @@ type Completed = (Source, BTreeSet<String>);
 
 /// The file with everything that it takes from its base; `None` when it has none.
 fn completed(text: &Source, read: &dyn Fn(&Path) -> Result<String>, depth: usize) -> Result<Option<Completed>> {
-    // most files stand alone, and are read once
-    if !text.inner().contains("based_on") {
-        return Ok(None);
-    }
     // what is no TOML is reported with its place by the one who reads it
     let Ok(own) = toml::from_str::<Table>(text.inner()) else { return Ok(None) };
     let Some(Value::String(word)) = own.get("based_on").cloned() else { return Ok(None) };

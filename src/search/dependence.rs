@@ -85,7 +85,7 @@ pub struct Dependence {
     /// Numbers of the groups of touches that it is of: one for each point of a curve over groups, one for a block that
     /// moves.
     pub groups: Vec<usize>,
-    /// The curve against the variable; empty for a product of two variables, and for what neither passes nor goes first.
+    /// The curve against the variable; empty for a product of two variables.
     pub curve: Vec<CurvePoint>,
 }
 
@@ -135,21 +135,17 @@ pub fn dependences(question: Question, features: &Features, generics: &Generics)
             first.push(candidate);
         }
     }
-    let of = |(place, &candidate): (usize, &usize)| {
-        let score = &search.scores[candidate];
-        // nobody looks at the curve of what does not pass, but for the first
-        let is_drawn = place == 0 || score.proposed();
-        dependence(&search, score, &generics.shapes[candidate], features, generics, (total, is_drawn))
+    let of = |&candidate: &usize| {
+        dependence(&search, &search.scores[candidate], &generics.shapes[candidate], features, generics, total)
     };
-    let mut out: Vec<Dependence> = first.par_iter().enumerate().map(of).collect();
+    let mut out: Vec<Dependence> = first.par_iter().map(of).collect();
     if let Some(mut score) = same.ranking().first().map(|&c| same.scores[c].clone()) {
         // one family with all the shapes
         let tested = search.scores.iter().filter(|s| s.visible()).count() + library.candidates().len();
         score.p_adjusted = (score.p * tested as f64 * FAMILY_LEVEL / GENERIC_LEVEL).min(1.0);
         score.candidate = constants[score.candidate];
         let passes = |d: &Dependence| d.p_adjusted < FAMILY_LEVEL;
-        let shape = &generics.shapes[score.candidate];
-        let constant = dependence(&search, &score, shape, features, generics, (total, true));
+        let constant = dependence(&search, &score, &generics.shapes[score.candidate], features, generics, total);
         // beside something that changes it is the level of that
         let at = usize::from(out.first().is_some_and(passes) || !passes(&constant)).min(out.len());
         out.insert(at, constant);
@@ -163,7 +159,7 @@ fn dependence(
     shape: &Shape,
     features: &Features,
     generics: &Generics,
-    (total, is_drawn): (f64, bool),
+    total: f64,
 ) -> Dependence {
     let candidate = &generics.library.candidates()[score.candidate];
     let all = &shape.functions[score.variant];
@@ -214,7 +210,7 @@ fn dependence(
             }
         }),
         groups: functions.iter().filter_map(|f| f.group().map(|g| g.1)).collect(),
-        curve: if is_drawn { curve(search, score, shape, features, &kept) } else { Vec::new() },
+        curve: curve(search, score, shape, features, &kept),
     }
 }
 

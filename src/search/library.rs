@@ -129,15 +129,7 @@ impl Library {
         Self { n_rows, parts: vec![part], candidates: Vec::new() }
     }
 
-    /// The same of matrices one after the other.
-    #[must_use]
-    pub fn of_matrices<'a>(n_rows: usize, matrices: impl Iterator<Item = &'a DMatrix<f64>> + Clone) -> Self {
-        let mut data = Vec::with_capacity(matrices.clone().map(DMatrix::len).sum());
-        matrices.for_each(|columns| data.extend_from_slice(columns.as_slice()));
-        Self::kept(n_rows, data)
-    }
-
-    /// Columns that are to stand in a library ([`Library::of_parts`], [`Library::joined`]): those of rounding are nothing.
+    /// Columns that are to be in a library ([`Library::of_parts`], [`Library::joined`]): those of rounding are nothing.
     #[must_use]
     pub fn part(n_rows: usize, columns: DMatrix<f64>) -> Arc<Vec<f64>> {
         let mut data: Vec<f64> = columns.data.into();
@@ -145,7 +137,7 @@ impl Library {
         Arc::new(data)
     }
 
-    /// A library of such columns where they are. Many small parts are slower to work with than one, and not to be copied.
+    /// A library of such columns where they are, without a copy; work on many small parts takes longer than on one.
     #[must_use]
     pub fn of_parts<'a>(n_rows: usize, parts: impl Iterator<Item = &'a Arc<Vec<f64>>>) -> Self {
         let mut out = Self::new(n_rows);
@@ -157,19 +149,11 @@ impl Library {
         out
     }
 
-    /// A library of such columns in one piece.
+    /// A library of columns of many parts in one piece.
     #[must_use]
-    pub fn joined(n_rows: usize, parts: &[Arc<Vec<f64>>]) -> Self {
-        let mut data = vec![0.0; parts.iter().map(|part| part.len()).sum()];
-        let mut left = data.as_mut_slice();
-        let mut jobs = Vec::with_capacity(parts.len());
-        for part in parts {
-            let (own, behind) = left.split_at_mut(part.len());
-            jobs.push((own, part));
-            left = behind;
-        }
-        jobs.into_par_iter().for_each(|(own, part)| own.copy_from_slice(part));
-        Self::of_parts(n_rows, std::iter::once(&Arc::new(data)))
+    pub fn joined<'a>(n_rows: usize, parts: impl Iterator<Item = &'a Vec<f64>>) -> Self {
+        let parts: Vec<&[f64]> = parts.map(Vec::as_slice).collect();
+        Self::of_parts(n_rows, std::iter::once(&Arc::new(parts.concat())))
     }
 
     /// A library of columns that are made when they are needed: many touches have more of them than memory holds.
@@ -354,8 +338,9 @@ impl Library {
 
     /// The same candidates with columns that were whitened otherwise, variant by variant.
     #[must_use]
-    pub fn with_variants(&self, n_rows: usize, columns: &[DMatrix<f64>]) -> Self {
-        Self { candidates: self.candidates.clone(), ..Self::of_matrices(n_rows, columns.iter()) }
+    pub fn with_variants(&self, n_rows: usize, columns: Vec<DMatrix<f64>>) -> Self {
+        let parts: Vec<_> = columns.into_iter().map(|columns| Self::part(n_rows, columns)).collect();
+        Self { candidates: self.candidates.clone(), ..Self::joined(n_rows, parts.iter().map(|part| &**part)) }
     }
 
     /// The same candidates in a regression whose rows a change makes of this one's; `None` where columns are not kept in memory.
@@ -364,7 +349,7 @@ impl Library {
         let n_rows = self.n_rows;
         for part in &mut self.parts {
             let Columns::Kept(data) = &mut part.columns else { return None };
-            // in place, unless somebody else has them
+            // in place, unless another library has them too
             Arc::make_mut(data).par_chunks_mut((CHUNK * n_rows).max(1)).for_each(|some| {
                 let columns = some.len() / n_rows;
                 change(DMatrixViewMut::from_slice(some, n_rows, columns));

@@ -37,7 +37,7 @@ pub(super) struct Moments {
     pub rr: f64,
     /// JᵀPr of all columns.
     pub jr: DVector<f64>,
-    /// QᵀJ, p × columns.
+    /// QᵀJ, as many rows as the base has directions: those that a training set has lost are 0.
     pub qj: DMatrix<f64>,
     /// JᵀJ of each variant of each candidate, in their order.
     pub blocks: Vec<DMatrix<f64>>,

@@ -233,7 +233,7 @@ fn n_scanned(candidate: &Candidate) -> usize {
 
 /// What each variant of a candidate takes away, where these touches see it; its variants are those from `first` on.
 fn taken(moments: &Moments, candidate: &Candidate, pure: Option<PureError>, first: usize) -> Vec<Option<Taken>> {
-    /// Variants that are no work for a thread of its own.
+    /// So few variants are no work for a further thread.
     const FEW: usize = 32;
     let (total, free) = whole(moments, pure);
     let of = |(v, variant): (usize, &Variant)| {

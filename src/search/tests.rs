@@ -249,8 +249,14 @@ fn grouped(rng: &mut ChaCha8Rng, groups: usize, each: usize) -> (DMatrix<f64>, V
 
 #[test]
 fn a_fold_is_a_refit_without_the_group() {
+    // groups of more and of fewer touches than the base has columns
+    is_refitted_without_each_group(10, 14);
+    is_refitted_without_each_group(28, 5);
+}
+
+fn is_refitted_without_each_group(groups: usize, each: usize) {
     let mut rng = rng(18);
-    let (a, number) = grouped(&mut rng, 10, 14);
+    let (a, number) = grouped(&mut rng, groups, each);
     let base = Basis::new(&a);
     let library = correlated_library(&mut rng, 140, 25);
     let r = noise(&mut rng, 140) - library.columns(5, 0) * noise(&mut rng, library.columns(5, 0).ncols()) * 0.4;
@@ -272,7 +278,7 @@ fn a_fold_is_a_refit_without_the_group() {
             let search = Search::new(ask(&r_train, &trained), &own);
             let chosen = if choice == Choice::Redone { search.leader() } else { Some(5) };
             assert_eq!(chosen, fold.chosen);
-            let base_columns: Vec<usize> = if fold.group == 9 { (0..7).collect() } else { (0..8).collect() };
+            let base_columns: Vec<usize> = if fold.group == groups - 1 { (0..7).collect() } else { (0..8).collect() };
             let a_known = a.select_columns(&base_columns);
             let with = chosen.map_or_else(|| a_known.clone(), |c| beside(&a_known, &library.columns(c, 0)));
             let (small, _) = least_squares(&rows(&a_known, &train), &r_train);
@@ -344,4 +350,48 @@ fn lack_of_fit_has_its_level() {
     for p in p {
         assert!(kolmogorov(p) < 1.63);
     }
+}
+
+#[test]
+fn a_fold_without_a_base_model_leaves_its_touches_as_they_are() {
+    let mut rng = rng(23);
+    let base = Basis::new(&DMatrix::zeros(40, 0));
+    let column = noise_matrix(&mut rng, 40, 1);
+    let r = noise(&mut rng, 40) * 0.1 - &column;
+    let mut library = Library::new(40);
+    library.push("truth", Origin::Catalogue, &column);
+    let number: Vec<usize> = (0..40).map(|i| i / 4).collect();
+    let result = held_out(ask(&r, &base), &library, &number, Choice::Given(0));
+    assert_eq!(result.scored, 40);
+    assert!((result.before - r.norm() / 40f64.sqrt()).abs() < 1e-12);
+    assert!(result.after < 0.15 && result.falls(), "{result:?}");
+}
+
+#[test]
+fn the_best_variant_is_that_of_the_whole_test() {
+    let mut rng = rng(24);
+    let base = Basis::new(&noise_matrix(&mut rng, ROWS, 5));
+    let r = noise(&mut rng, ROWS);
+    for columns in 1..4 {
+        let variants: Vec<DMatrix<f64>> = (0..70).map(|_| noise_matrix(&mut rng, ROWS, columns)).collect();
+        let mut library = Library::new(ROWS);
+        library.push_scan("scan", Origin::Catalogue, variants.iter().enumerate().map(|(i, c)| (i as f64, c)), 1);
+        let score = Search::new(ask(&r, &base), &library).scores.remove(0);
+        assert_eq!(best_variant(ask(&r, &base), &library), Some((score.variant, score.delta_ss)));
+    }
+    let mut nothing = Library::new(ROWS);
+    nothing.push_scan("scan", Origin::Catalogue, [(0.0, DMatrix::zeros(ROWS, 1)), (1.0, DMatrix::zeros(ROWS, 1))], 1);
+    assert_eq!(best_variant(ask(&r, &base), &nothing), None);
+}
+
+#[test]
+fn a_library_in_parts_is_the_one_in_a_piece_and_each_may_be_changed_alone() {
+    let mut rng = rng(25);
+    let columns: Vec<DMatrix<f64>> = (1..4).map(|q| noise_matrix(&mut rng, 30, q)).collect();
+    let parts: Vec<_> = columns.iter().map(|c| Library::part(30, c.clone())).collect();
+    let in_parts = Library::of_parts(30, parts.iter());
+    let joined = Library::joined(30, parts.iter().map(|part| &**part));
+    assert_eq!((in_parts.n_columns(), in_parts.matrix()), (6, joined.matrix()));
+    let doubled = in_parts.clone().changed(&|mut columns| columns *= 2.0).unwrap();
+    assert_eq!((doubled.matrix(), in_parts.matrix()), (joined.matrix() * 2.0, joined.matrix()));
 }

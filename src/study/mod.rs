@@ -362,7 +362,6 @@ impl Study {
             type_b: self.type_b.clone(),
             masked: self.masked.clone(),
             bare: false,
-            without_unmodelled: false,
             quick: false,
             all_in: false,
         }

@@ -11,9 +11,6 @@ use crate::fit::{Fit, Settings, uncertainty};
 /// A diagnosis of which the verdict and the first candidate are asked: no refit, no power.
 pub const VERDICT: Options<'static> = Options { at_most: 1, refit: false, power: false, planned: None };
 
-/// A diagnosis of which only is asked on what the residual depends.
-const DEPENDENCES: Options<'static> = Options { at_most: 0, ..VERDICT };
-
 impl Loaded {
     /// What is diagnosed: refits leave out the figures that need the whole catalogue.
     #[must_use]
@@ -90,9 +87,8 @@ impl Loaded {
     /// # Errors
     /// When a refit is impossible.
     pub fn compare(&self, fit: &Fit) -> Result<(Comparison, Diagnosis)> {
-        let (found, comparison) = rayon::join(|| self.diagnose(&self.settings(), fit, &DEPENDENCES), || compare(fit));
-        let found = found?;
-        let mut comparison = comparison.led_by(&leads(&found));
+        let found = self.diagnose(&self.settings(), fit, &VERDICT)?;
+        let mut comparison = compare(fit).led_by(&leads(&found));
         if found.verdict.most_touches_unusable() {
             comparison.says.clone_from(&found.says);
         }
