@@ -26,6 +26,9 @@ pub(super) struct Regression<'a> {
     pub change: Option<Change<'a>>,
 }
 
+/// Jᵀr and QᵀJ of some columns of a library, and JᵀJ of each variant among them.
+type Piece = (Vec<f64>, DMatrix<f64>, Vec<DMatrix<f64>>);
+
 /// Inner products of a regression and its candidates.
 #[derive(Debug, Clone)]
 pub(super) struct Moments {
@@ -55,53 +58,42 @@ impl Moments {
         let variants = library.candidates().iter().flat_map(|c| &c.variants).map(|v| v.columns.clone());
         let mut variants: Vec<(usize, Range<usize>)> = variants.enumerate().collect();
         variants.sort_by_key(|(_, columns)| columns.start);
-        let n_columns = library.n_columns();
-        let empty = |(r, projected): (&Regression, &DVector<f64>)| Self {
-            n: r.residual.len(),
-            p: r.base.rank(),
-            rr: projected.norm_squared(),
-            jr: DVector::zeros(n_columns),
-            qj: DMatrix::from_vec(r.base.rank(), n_columns, vec![0.0; r.base.rank() * n_columns]),
-            blocks: vec![DMatrix::zeros(0, 0); variants.len()],
-        };
-        let mut out: Vec<Self> = regressions.iter().zip(&projected).map(empty).collect();
-        // every piece of the library has its own places in the results, and is written there at once
-        let mut jobs: Vec<(Range<usize>, Vec<(&mut [f64], &mut [f64])>)> =
-            library.chunks().into_iter().map(|span| (span, Vec::with_capacity(regressions.len()))).collect();
-        for Self { p, jr, qj, .. } in &mut out {
-            let (mut jr, mut qj, mut at) = (jr.as_mut_slice(), qj.as_mut_slice(), 0);
-            for (span, places) in &mut jobs {
-                let (own_jr, behind_jr) = jr.split_at_mut(span.end - at);
-                let (own_qj, behind_qj) = qj.split_at_mut((span.end - at) * *p);
-                places.push((&mut own_jr[span.start - at..], &mut own_qj[(span.start - at) * *p..]));
-                (jr, qj, at) = (behind_jr, behind_qj, span.end);
-            }
-        }
-        let of = |(span, places): (Range<usize>, Vec<(&mut [f64], &mut [f64])>)| -> Vec<Vec<DMatrix<f64>>> {
+        let of = |span: Range<usize>| -> Vec<Piece> {
             let from = variants.partition_point(|(_, v)| v.start < span.start);
             let own = variants[from..].iter().take_while(|(_, v)| v.end <= span.end);
             library.with(span.clone(), |whole| {
-                let each = regressions.iter().zip(&projected).zip(places).map(|((regression, r), (jr, qj))| {
+                let each = regressions.iter().zip(&projected).map(|(regression, r)| {
                     let changed = regression.change.map(|change| {
                         let mut own = whole.into_owned();
                         change(own.as_view_mut());
                         own
                     });
                     let j = changed.as_ref().map_or(whole, DMatrix::as_view);
-                    jr.iter_mut().zip(j.column_iter()).for_each(|(to, column)| *to = column.dot(r));
-                    let q_t = regression.base.transposed();
-                    DMatrixViewMut::from_slice(qj, q_t.nrows(), span.len()).gemm(1.0, q_t, &j, 0.0);
-                    own.clone().map(|(_, v)| block(j.columns(v.start - span.start, v.len()))).collect()
+                    let jr = j.column_iter().map(|column| column.dot(r)).collect();
+                    let blocks = own.clone().map(|(_, v)| block(j.columns(v.start - span.start, v.len()))).collect();
+                    (jr, regression.base.transposed() * j, blocks)
                 });
                 each.collect()
             })
         };
-        let pieces: Vec<Vec<Vec<DMatrix<f64>>>> = jobs.into_par_iter().map(of).collect();
+        let empty = |(r, projected): (&Regression, &DVector<f64>)| Self {
+            n: r.residual.len(),
+            p: r.base.rank(),
+            rr: projected.norm_squared(),
+            jr: DVector::zeros(library.n_columns()),
+            qj: DMatrix::zeros(r.base.rank(), library.n_columns()),
+            blocks: vec![DMatrix::zeros(0, 0); variants.len()],
+        };
+        let mut out: Vec<Self> = regressions.iter().zip(&projected).map(empty).collect();
+        let chunks = library.chunks();
+        let pieces: Vec<_> = chunks.par_iter().map(|span| of(span.clone())).collect();
         let mut at = 0;
-        for each in pieces {
+        for (span, each) in chunks.into_iter().zip(pieces) {
             let from = at;
-            for (moments, blocks) in out.iter_mut().zip(each) {
+            for (moments, (jr, qj, blocks)) in out.iter_mut().zip(each) {
                 at = from + blocks.len();
+                moments.jr.rows_mut(span.start, span.len()).copy_from_slice(&jr);
+                moments.qj.columns_mut(span.start, span.len()).copy_from(&qj);
                 for ((variant, _), block) in variants[from..at].iter().zip(blocks) {
                     moments.blocks[*variant] = block;
                 }
