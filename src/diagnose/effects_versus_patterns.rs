@@ -6,7 +6,7 @@
 //! and not for those that it has besides: a block that slips in X alone is a slip all the same.
 
 use crate::search::pattern_tests::{CONSTANT, Generics};
-use crate::search::{Basis, KEPT, Library, Question, Search};
+use crate::search::{Basis, KEPT, Question, Search};
 use nalgebra::{DMatrix, DVector};
 
 /// Steps on either side.
@@ -57,12 +57,19 @@ impl End {
     }
 }
 
-/// Adds what passes its test, the first candidate given or found.
-fn way(question: Question, library: &Library, generic: bool, first: Option<usize>) -> End {
+/// Adds what passes its test, the first candidate given or found by the tests that are made already.
+fn way(tested: &Search, generic: bool, first: Option<usize>) -> End {
+    let question = tested.question;
     let n = question.residual.len() as f64;
     let mut end = End::start(question);
     while end.steps.len() < MOST_STEPS {
-        let search = Search::new(Question { residual: &end.residual, base: &end.basis, ..question }, library);
+        let again;
+        let search = if end.steps.is_empty() {
+            tested
+        } else {
+            again = Search::new(Question { residual: &end.residual, base: &end.basis, ..question }, tested.library);
+            &again
+        };
         let found = if generic { search.leading_shape() } else { search.leader() };
         let Some(next) = first.filter(|_| end.steps.is_empty()).or(found) else { break };
         let score = &search.scores[next];
@@ -111,16 +118,16 @@ fn acting(end: &End, columns: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Holds effects, `first` in front, against shapes.
-pub(super) fn weigh(question: Question, named: &Library, generics: &Generics, first: usize) -> Weighed {
-    let names = way(question, named, false, Some(first));
-    let shapes = way(question, &generics.library, true, None);
+pub(super) fn weigh(named: &Search, generics: &Generics, first: usize) -> Weighed {
+    let names = way(named, false, Some(first));
+    let shapes = way(&Search::new(named.question, &generics.library), true, None);
     let Some(&shape) = shapes.steps.first() else { return Weighed::default() };
     // visits that each stand elsewhere follow anything, and what is the same at every touch is a part of many effects
     let speaks = !["visit", CONSTANT].contains(&generics.shapes[shape].depends_on.as_str());
     let better = (speaks && shapes.after_first + BETTER < names.after_first).then_some(shape);
     // together they leave less and cost less
     let beaten = shapes.criterion + CLEARLY < names.criterion;
-    Weighed { shapes_win: beaten || left_to_shapes(question, named, generics, first), better }
+    Weighed { shapes_win: beaten || left_to_shapes(named, generics, first), better }
 }
 
 /// What columns leave and cost by themselves, by the criterion.
@@ -141,17 +148,17 @@ pub(super) fn as_well(question: Question, effect: &DMatrix<f64>, columns: &DMatr
 }
 
 /// Is much of it left to a shape once the first effect is in the model, and to no second effect?
-fn left_to_shapes(question: Question, named: &Library, generics: &Generics, first: usize) -> bool {
+fn left_to_shapes(named: &Search, generics: &Generics, first: usize) -> bool {
+    let question = named.question;
     let residual = question.base.project(question.residual);
     let dof = question.residual.len() as f64 - question.base.rank() as f64;
-    let before = Search::new(question, named);
     let mut basis = question.base.clone();
-    basis.extend(&before.columns(first), KEPT);
+    basis.extend(&named.columns(first), KEPT);
     let left = basis.project(&residual);
     let now = Question { residual: &left, base: &basis, ..question };
     let after = Search::new(now, &generics.library);
     let Some(shape) = after.leading_shape() else { return false };
-    let second = Search::new(now, named);
+    let second = Search::new(now, named.library);
     let name_ln_p = second.leader().map_or(0.0, |l| second.scores[l].ln_p);
     let share = after.scores[shape].delta_ss / (residual.norm_squared() - dof).max(1.0);
     share > SHARE && after.scores[shape].ln_p + CLEARLY < name_ln_p

@@ -132,11 +132,15 @@ impl<'a> Examination<'a> {
 }
 
 /// The tests of a fit without the answer in words.
-fn examine<'a>(fit: &Fit, found: &'a Regression<'a>, features: &Features, at_most: usize) -> Examination<'a> {
+fn examine<'a>(
+    fit: &Fit,
+    found: &'a Regression<'a>,
+    search: Search<'a>,
+    features: &Features,
+    at_most: usize,
+) -> Examination<'a> {
     let Regression { evidence, named, generics, .. } = found;
     let question = evidence.question();
-    let (search, dependences) =
-        rayon::join(|| Search::new(question, &named.library), || dependences(question, features, generics));
     let passes = search.leader().is_some();
     let ordered = if passes { None } else { found.search_for_order(fit) };
     let order = ordered.as_ref().unwrap_or(&search);
@@ -147,7 +151,7 @@ fn examine<'a>(fit: &Fit, found: &'a Regression<'a>, features: &Features, at_mos
     Examination {
         groups,
         ordered,
-        dependences,
+        dependences: dependences(question, features, generics),
         lack_of_fit: lack_of_fit(&question),
         given: behind.is_some(),
         nested: behind.or(nested),
@@ -240,7 +244,7 @@ pub fn diagnose(subject: Subject, options: &Options) -> Result<Diagnosis> {
         return Ok(answer);
     }
     let found = Regression::new(subject.fit, subject.machine, subject.catalogue, &features);
-    Tested::new(subject, &found, &features, options)?.answer()
+    Tested::new(subject, &found, found.search(), &features, options)?.answer()
 }
 
 /// A fit with all tests made, and refitted with what they name.
@@ -259,14 +263,15 @@ impl<'a> Tested<'a> {
     fn new(
         subject: Subject<'a>,
         found: &'a Regression<'a>,
+        search: Search<'a>,
         features: &'a Arc<Features>,
         options: &'a Options<'a>,
     ) -> Result<Self> {
         let Subject { machine, fit, .. } = subject;
         let Regression { evidence, named, generics, .. } = found;
-        let mut seen = examine(fit, found, features, options.at_most);
+        let mut seen = examine(fit, found, search, features, options.at_most);
         let weighed = match seen.groups.first().filter(|_| seen.nested.is_some()) {
-            Some(group) => effects_versus_patterns::weigh(evidence.question(), &named.library, generics, group.first()),
+            Some(group) => effects_versus_patterns::weigh(&seen.search, generics, group.first()),
             None => effects_versus_patterns::Weighed::default(),
         };
         let mut beside = decide::OtherEvidence {
@@ -369,11 +374,13 @@ fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagno
     let fit = identify_data(machine, catalogue, subject.fit.data.clone(), &settings)?;
     let features = Arc::new(features::features(&fit, machine));
     let found = Regression::new(&fit, machine, catalogue, &features);
+    let search = found.search();
     // a set-up mistake is no effect of the catalogue, and is tried where the error is gross
-    if fit.outcome.rms_um <= setup_mistakes::GROSS_UM && !could_explain(&found) {
+    if fit.outcome.rms_um <= setup_mistakes::GROSS_UM && !could_explain(&found.named, &search) {
         return Ok(None);
     }
-    let tested = Tested::new(Subject { settings: &settings, fit: &fit, ..subject }, &found, &features, options)?;
+    let subject_of_all = Subject { settings: &settings, fit: &fit, ..subject };
+    let tested = Tested::new(subject_of_all, &found, search, &features, options)?;
     // most of the answer is worked out only where it can be one
     if !tested.may_explain() {
         return Ok(None);
@@ -400,12 +407,10 @@ fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagno
 
 /// Is there an effect, or a pair that would be named together, that may bring the error down to the noise? Linear tests say so but for
 /// shapes: a refit may find a better value than those of the scan, and may change shapes that are not scanned.
-fn could_explain(found: &Regression) -> bool {
+fn could_explain(named: &Named, search: &Search) -> bool {
     /// Part of the residual by which a better value of a scanned shape may explain more.
     const MORE: f64 = 0.05;
-    let Regression { evidence, named, .. } = found;
-    let question = evidence.question();
-    let search = Search::new(question, &named.library);
+    let question = search.question;
     let has_other_shapes = |c: usize| {
         let shapes = named.effects[c].parameters.iter().filter(|p| p.shape.is_some()).count();
         shapes > usize::from(named.scanned[c].is_some())
@@ -413,7 +418,7 @@ fn could_explain(found: &Regression) -> bool {
     if search.scores.iter().any(|s| s.proposed() && has_other_shapes(s.candidate)) {
         return true;
     }
-    let gained = search.scores.iter().map(|s| s.delta_ss).fold(pairs::gained(&search), f64::max);
+    let gained = search.scores.iter().map(|s| s.delta_ss).fold(pairs::gained(search), f64::max);
     (1.0 - MORE) * lack_of_fit(&question).ss - gained <= TIMES_NOISE.powi(2) * question.residual.len() as f64
 }
 
@@ -453,12 +458,14 @@ fn settings_with(subject: Subject, more: &[&str]) -> Settings {
 /// Does a fit still miss something, by the tests of the first step?
 fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
     let features = Arc::new(features::features(fit, machine));
-    let Regression { evidence, named, generics, .. } = Regression::new(fit, machine, catalogue, &features);
-    let question = evidence.question();
-    if Search::new(question, &named.library).leader().is_some() {
+    let found = Regression::new(fit, machine, catalogue, &features);
+    let question = found.evidence.question();
+    if found.search().leader().is_some() {
         return true;
     }
-    dependences(question, &features, &generics).iter().any(|d| d.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL)
+    dependences(question, &features, &found.generics)
+        .iter()
+        .any(|d| d.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL)
         || lack_of_fit(&question).p < decide::LACK_OF_FIT
 }
 

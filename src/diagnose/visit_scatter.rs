@@ -62,6 +62,11 @@ impl<'c> Regression<'c> {
         }
     }
 
+    /// The tests of effects.
+    pub fn search(&self) -> Search<'_> {
+        Search::new(self.evidence.question(), &self.named.library)
+    }
+
     /// The tests of effects with the scatter that is left with the most likely one: their order where no test passes. Its columns are
     /// made when it is asked for.
     pub fn search_for_order(&self, fit: &Fit) -> Option<Search<'_>> {
