@@ -5,6 +5,7 @@
 //! shapes come to, by what they leave and what they cost (Schwarz's criterion). Either side pays for the parameters that act
 //! and not for those that it has besides: a block that slips in X alone is a slip all the same.
 
+use super::Examination;
 use crate::search::pattern_tests::{CONSTANT, Generics};
 use crate::search::{Basis, KEPT, Question, Search};
 use nalgebra::{DMatrix, DVector};
@@ -67,7 +68,7 @@ fn way(tested: &Search, generic: bool, first: Option<usize>) -> End {
         let search = if end.steps.is_empty() {
             tested
         } else {
-            again = Search::new(Question { residual: &end.residual, base: &end.basis, ..question }, tested.library);
+            again = tested.with_larger_base(Question { residual: &end.residual, base: &end.basis, ..question });
             &again
         };
         let found = if generic { search.leading_shape() } else { search.leader() };
@@ -118,16 +119,16 @@ fn acting(end: &End, columns: &DMatrix<f64>) -> DMatrix<f64> {
 }
 
 /// Holds effects, `first` in front, against shapes.
-pub(super) fn weigh(named: &Search, generics: &Generics, first: usize) -> Weighed {
-    let names = way(named, false, Some(first));
-    let shapes = way(&Search::new(named.question, &generics.library), true, None);
+pub(super) fn weigh(seen: &Examination, generics: &Generics, first: usize) -> Weighed {
+    let names = way(&seen.search, false, Some(first));
+    let shapes = way(&seen.patterns, true, None);
     let Some(&shape) = shapes.steps.first() else { return Weighed::default() };
     // visits that each stand elsewhere follow anything, and what is the same at every touch is a part of many effects
     let speaks = !["visit", CONSTANT].contains(&generics.shapes[shape].depends_on.as_str());
     let better = (speaks && shapes.after_first + BETTER < names.after_first).then_some(shape);
     // together they leave less and cost less
     let beaten = shapes.criterion + CLEARLY < names.criterion;
-    Weighed { shapes_win: beaten || left_to_shapes(named, generics, first), better }
+    Weighed { shapes_win: beaten || left_to_shapes(seen, first), better }
 }
 
 /// What columns leave and cost by themselves, by the criterion.
@@ -148,7 +149,8 @@ pub(super) fn as_well(question: Question, effect: &DMatrix<f64>, columns: &DMatr
 }
 
 /// Is much of it left to a shape once the first effect is in the model, and to no second effect?
-fn left_to_shapes(named: &Search, generics: &Generics, first: usize) -> bool {
+fn left_to_shapes(seen: &Examination, first: usize) -> bool {
+    let named = &seen.search;
     let question = named.question;
     let residual = question.base.project(question.residual);
     let dof = question.residual.len() as f64 - question.base.rank() as f64;
@@ -156,9 +158,9 @@ fn left_to_shapes(named: &Search, generics: &Generics, first: usize) -> bool {
     basis.extend(&named.columns(first), KEPT);
     let left = basis.project(&residual);
     let now = Question { residual: &left, base: &basis, ..question };
-    let after = Search::new(now, &generics.library);
+    let after = seen.patterns.with_larger_base(now);
     let Some(shape) = after.leading_shape() else { return false };
-    let second = Search::new(now, named.library);
+    let second = named.with_larger_base(now);
     let name_ln_p = second.leader().map_or(0.0, |l| second.scores[l].ln_p);
     let share = after.scores[shape].delta_ss / (residual.norm_squared() - dof).max(1.0);
     share > SHARE && after.scores[shape].ln_p + CLEARLY < name_ln_p

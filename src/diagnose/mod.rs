@@ -95,7 +95,9 @@ pub(crate) struct Examination<'a> {
     pub named: &'a Named<'a>,
     /// Their tests.
     pub search: Search<'a>,
-    /// The same for sizes and order, where no test passes: with the scatter that is left with the most likely effect.
+    /// Those of shapes without a name.
+    pub patterns: Search<'a>,
+    /// Tests of the effects for sizes and order, where no test passes: with the scatter that is left with the most likely effect.
     ordered: Option<Search<'a>>,
     /// What these touches cannot tell apart, best first.
     pub groups: Vec<Group>,
@@ -141,6 +143,7 @@ fn examine<'a>(
 ) -> Examination<'a> {
     let Regression { evidence, named, generics, .. } = found;
     let question = evidence.question();
+    let patterns = Search::new(question, &generics.library);
     let passes = search.leader().is_some();
     let ordered = if passes { None } else { found.search_for_order(fit) };
     let order = ordered.as_ref().unwrap_or(&search);
@@ -151,7 +154,8 @@ fn examine<'a>(
     Examination {
         groups,
         ordered,
-        dependences: dependences(question, features, generics),
+        dependences: dependences(&patterns, features, generics),
+        patterns,
         lack_of_fit: lack_of_fit(&question),
         given: behind.is_some(),
         nested: behind.or(nested),
@@ -271,7 +275,7 @@ impl<'a> Tested<'a> {
         let Regression { evidence, named, generics, .. } = found;
         let mut seen = examine(fit, found, search, features, options.at_most);
         let weighed = match seen.groups.first().filter(|_| seen.nested.is_some()) {
-            Some(group) => effects_versus_patterns::weigh(&seen.search, generics, group.first()),
+            Some(group) => effects_versus_patterns::weigh(&seen, generics, group.first()),
             None => effects_versus_patterns::Weighed::default(),
         };
         let mut beside = decide::OtherEvidence {
@@ -282,7 +286,7 @@ impl<'a> Tested<'a> {
             scatter: scatter(fit, machine, evidence),
         };
         let mut decision = decide::decide(&seen, &beside);
-        if let Some(pair) = pairs::both(subject, &seen, &decision, generics) {
+        if let Some(pair) = pairs::both(subject, &seen, &decision) {
             pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most);
             seen.groups.iter_mut().for_each(|group| without_needless_incidents(group, named));
             (seen.both, seen.given) = (Some(pair), true);
@@ -463,7 +467,8 @@ fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
     if found.search().leader().is_some() {
         return true;
     }
-    dependences(question, &features, &found.generics)
+    let patterns = Search::new(question, &found.generics.library);
+    dependences(&patterns, &features, &found.generics)
         .iter()
         .any(|d| d.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL)
         || lack_of_fit(&question).p < decide::LACK_OF_FIT

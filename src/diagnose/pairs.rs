@@ -4,7 +4,6 @@ use super::decide::{Decision, Kind, LACK_OF_FIT, bears_out};
 use super::{Examination, Subject, tried_with};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, held_out};
-use crate::search::pattern_tests::Generics;
 use crate::search::{KEPT, Library, Origin, Pair, Question, Search, lack_of_fit};
 
 /// So many of the most significant groups are paired: effects that these touches cannot separate fill no list.
@@ -16,7 +15,7 @@ const CLEARLY: f64 = 10.0;
 
 /// The pair that is to be named in place of what the tests of single effects decide: together they explain all that no one does, no
 /// pattern says it with less, and held-out touches bear them out.
-pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision, generics: &Generics) -> Option<Pair> {
+pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision) -> Option<Pair> {
     if decision.kind == Kind::TooFewTouches || decision.kind == Kind::Adequate {
         return None;
     }
@@ -33,8 +32,7 @@ pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision, ge
         }
     }
     // a pattern without a name that says it with less is no pair of names
-    let patterns = Search::new(search.question, &generics.library);
-    if patterns.leading_shape().is_some_and(|shape| patterns.bic(shape) < pair.bic) {
+    if seen.patterns.leading_shape().is_some_and(|shape| seen.patterns.bic(shape) < pair.bic) {
         return None;
     }
     let mut library = Library::new(search.library.n_rows());

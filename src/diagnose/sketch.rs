@@ -6,6 +6,7 @@ use super::features::features;
 use super::visit_scatter::Regression;
 use crate::diag::{Failure, Result};
 use crate::fit::Fit;
+use crate::search::Search;
 use crate::search::dependence::{Dependence, dependences};
 use crate::words::diagnose as words;
 use std::fmt::Write as _;
@@ -35,7 +36,7 @@ pub fn sketch(subject: Subject, taken: &dyn Fn(&str) -> bool) -> Result<Sketch> 
     let features = std::sync::Arc::new(features(subject.fit, subject.machine));
     let Regression { evidence, generics, .. } =
         Regression::new(subject.fit, subject.machine, subject.catalogue, &features);
-    let all = dependences(evidence.question(), &features, &generics);
+    let all = dependences(&Search::new(evidence.question(), &generics.library), &features, &generics);
     let best = best(&all, subject.fit)?;
     let share = super::assemble_diagnosis::beyond_the_noise(&evidence, best.share, best.terms.len());
     if best.on == words::MOVED_BLOCK {

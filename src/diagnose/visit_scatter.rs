@@ -145,8 +145,9 @@ fn calm<'c>(
     library.append(generics.without("visit"));
     let question = evidence.question();
     let (mut basis, mut residual) = (question.base.clone(), question.base.project(question.residual));
+    let tested = Search::new(question, &library);
     for _ in 0..AT_MOST {
-        let search = Search::new(Question { residual: &residual, base: &basis, ..question }, &library);
+        let search = tested.with_larger_base(Question { residual: &residual, base: &basis, ..question });
         let passed = [search.leader(), search.leading_shape()].into_iter().flatten();
         let best = passed.min_by(|&a, &b| search.scores[a].ln_p.total_cmp(&search.scores[b].ln_p))?;
         if basis.extend(&search.columns(best), KEPT) == 0 {

@@ -95,7 +95,8 @@ pub struct Dependence {
 /// same at every touch depends on no variable: it is a finding of its own, and taken off before variables are looked at, or
 /// each group of touches and each step near an end of the run would be credited with it.
 #[must_use]
-pub fn dependences(question: Question, features: &Features, generics: &Generics) -> Vec<Dependence> {
+pub fn dependences(patterns: &Search, features: &Features, generics: &Generics) -> Vec<Dependence> {
+    let question = patterns.question;
     let total = question.base.project(question.residual).norm_squared();
     let constants: Vec<usize> =
         (0..generics.shapes.len()).filter(|&c| generics.shapes[c].depends_on == CONSTANT).collect();
@@ -107,7 +108,7 @@ pub fn dependences(question: Question, features: &Features, generics: &Generics)
         library.push(&generics.library.candidates()[c].id, Origin::Generic, &columns);
     }
     let same = Search::new(question, &library);
-    let search = Search::new(Question { base: &base, ..question }, &generics.library);
+    let search = patterns.with_larger_base(Question { base: &base, ..question });
     let mut ranking = search.ranking();
     // what passes goes before what does not: of one variable the first entry speaks
     ranking.sort_by_key(|&c| !search.scores[c].proposed());

@@ -102,6 +102,21 @@ impl Moments {
         out
     }
 
+    /// The same once the base has further directions behind its own: q of them, q × rows, with what of the residual lies along each.
+    pub fn with_more(&self, rows: &DMatrix<f64>, along: &DVector<f64>, library: &Library) -> Self {
+        let chunks = library.chunks();
+        let pieces: Vec<DMatrix<f64>> =
+            chunks.par_iter().map(|span| library.with(span.clone(), |j| rows * j)).collect();
+        let (p, q) = (self.qj.nrows(), rows.nrows());
+        let mut qj = self.qj.clone().resize_vertically(p + q, 0.0);
+        for (span, piece) in chunks.iter().zip(&pieces) {
+            qj.view_mut((p, span.start), piece.shape()).copy_from(piece);
+        }
+        let jr = &self.jr - qj.rows(p, q).tr_mul(along);
+        let rr = (self.rr - along.norm_squared()).max(0.0);
+        Self { p: self.p + q, rr, jr, qj, blocks: self.blocks.clone(), n: self.n }
+    }
+
     /// MᵀJ for a matrix M of few columns that is already projected and some columns of the library, one after the other.
     pub fn cross(projected: &DMatrix<f64>, library: &Library, spans: &[Range<usize>]) -> DMatrix<f64> {
         let k = projected.ncols();

@@ -138,6 +138,20 @@ impl<'a> Search<'a> {
         Self { question, library, scores, moments, first_variant }
     }
 
+    /// The tests again with a larger base: its first directions are those of this one's, and the residual is the same.
+    #[must_use]
+    pub fn with_larger_base<'b>(&self, question: Question<'b>) -> Search<'b>
+    where
+        'a: 'b,
+    {
+        let before = self.question.base.rank();
+        let rows = question.base.transposed().rows(before, question.base.rank() - before).into_owned();
+        let along = &rows * self.question.residual;
+        let moments = self.moments.with_more(&rows, &along, self.library);
+        let scores = score(&moments, self.library, question.pure);
+        Search { question, library: self.library, scores, moments, first_variant: self.first_variant.clone() }
+    }
+
     /// Indices of the visible candidates: those with a name first, then generic shapes; each by significance.
     #[must_use]
     pub fn ranking(&self) -> Vec<usize> {

@@ -91,7 +91,7 @@ fn generics_of(f: &Features) -> Generics {
 }
 
 fn found(f: &Features, g: &Generics, base: &Basis, r: &DVector<f64>) -> Vec<Dependence> {
-    dependences(ask(r, base), f, g)
+    dependences(&Search::new(ask(r, base), &g.library), f, g)
 }
 
 #[test]

@@ -395,3 +395,24 @@ fn a_library_in_parts_is_the_one_in_a_piece_and_each_may_be_changed_alone() {
     let doubled = in_parts.clone().changed(&|mut columns| columns *= 2.0).unwrap();
     assert_eq!((doubled.matrix(), in_parts.matrix()), (joined.matrix() * 2.0, joined.matrix()));
 }
+
+#[test]
+fn tests_go_on_with_a_larger_base_as_if_made_anew() {
+    let mut rng = rng(26);
+    let base = Basis::new(&noise_matrix(&mut rng, ROWS, 7));
+    let library = correlated_library(&mut rng, ROWS, 30);
+    let r = noise(&mut rng, ROWS) - library.columns(4, 0) * noise(&mut rng, library.columns(4, 0).ncols());
+    let before = Search::new(ask(&r, &base), &library);
+    let mut larger = base.clone();
+    assert!(larger.extend(&noise_matrix(&mut rng, ROWS, 3), KEPT) == 3);
+    for base in [&larger, &base] {
+        let left = base.project(&r);
+        let anew = Search::new(ask(&left, base), &library);
+        let again = before.with_larger_base(ask(&left, base));
+        for (a, b) in anew.scores.iter().zip(&again.scores) {
+            let same = |x: f64, y: f64| (x - y).abs() <= 1e-9 * x.abs().max(1.0);
+            assert!(same(a.delta_ss, b.delta_ss) && same(a.ln_p, b.ln_p) && same(a.dof, b.dof), "{a:?} {b:?}");
+            assert_eq!((a.q, a.variant), (b.q, b.variant));
+        }
+    }
+}
