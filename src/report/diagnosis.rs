@@ -188,6 +188,8 @@ fn sizes(c: &Candidate) -> String {
 
 /// The misfit against its variable, in characters.
 fn plot(s: &Shape, paper: Paper) -> String {
+    /// Part of a row that is rounding.
+    const HALF_WAY: f64 = 1e-6;
     let (rows, columns) = (ROWS, paper.width.saturating_sub(16).clamp(COLUMNS.0, COLUMNS.1));
     let [zero, band, curve] = ['·', '░', '█'];
     let (Some(&from), Some(&to)) = (s.x.first(), s.x.last()) else { return String::new() };
@@ -195,8 +197,11 @@ fn plot(s: &Shape, paper: Paper) -> String {
     if limit <= 0.0 || to <= from {
         return String::new();
     }
-    let row =
-        |y: f64| (((limit - y) / (2.0 * limit)) * (rows - 1) as f64).round().clamp(0.0, (rows - 1) as f64) as usize;
+    // half-way between two rows it is the lower one, whatever the last bit says
+    let row = |y: f64| {
+        let at = (limit - y) / (2.0 * limit) * (rows - 1) as f64;
+        (at + HALF_WAY).round().clamp(0.0, (rows - 1) as f64) as usize
+    };
     let mut grid = vec![vec![' '; columns]; rows];
     grid[rows / 2].fill(zero);
     for c in 0..columns {
