@@ -95,7 +95,7 @@ pub(crate) struct Examination<'a> {
     pub named: &'a Named<'a>,
     /// Their tests.
     pub search: Search<'a>,
-    /// Those of shapes without a name.
+    /// The tests of shapes without a name.
     pub patterns: Search<'a>,
     /// Tests of the effects for sizes and order, where no test passes: with the scatter that is left with the most likely effect.
     ordered: Option<Search<'a>>,
