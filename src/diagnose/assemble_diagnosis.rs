@@ -4,6 +4,7 @@ use super::answer::{Candidate, Diagnosis, FORMAT, Finding, Gross, Outlier, Param
 use super::decide::{Decision, Findings, Kind as Decided, OtherEvidence};
 use super::evidence::Evidence;
 use super::first_order::FirstOrder;
+use super::folds::Folds;
 use super::next_step::MachineCheck;
 use super::{Examination, Subject, noise_um, separating_touches, setup_mistakes};
 use crate::fit::Fit;
@@ -44,6 +45,7 @@ pub(super) fn put_together(
     // what passes the test and is not confirmed stays a question, too
     let asked = decided == Decided::MissingEffect || (decision.named && !beside.shapes_win);
     let open = if asked { super::unresolved_pairs::open(seen) } else { super::unresolved_pairs::Open::default() };
+    let folds = Folds::new(fit, seen.evidence);
     let mut candidates: Vec<Candidate> = Vec::new();
     let gross_found = gross.first().is_some_and(|g| g.rms_um < setup_mistakes::RIGHT * fit.outcome.rms_um);
     if let Some(first) = gross.first().filter(|_| gross_found)
@@ -58,7 +60,7 @@ pub(super) fn put_together(
         candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, told))| Candidate {
             tell_apart: told.says,
             never_parted: told.never,
-            ..candidate(fit, seen, &first_order, group, (i == 0, decision.confirmed))
+            ..candidate(fit, seen, (&first_order, &folds), group, (i == 0, decision.confirmed))
         }));
     }
     candidates.truncate(options.at_most);
@@ -229,8 +231,8 @@ pub(super) fn put_together(
         consequences: Vec::new(),
         oversized: Vec::new(),
         rms_um: fit.outcome.rms_um,
-        held_out_rms_um: seen.folds.model().map(|h| h.rms_um),
-        held_out_se_um: seen.folds.model().and_then(|h| h.standard_error_um),
+        held_out_rms_um: folds.model().map(|h| h.rms_um),
+        held_out_se_um: folds.model().and_then(|h| h.standard_error_um),
         all_touches: None,
         noise_um: noise_um(fit),
         visit_um: um_from_mm(seen.evidence.tau_mm),
@@ -407,7 +409,7 @@ pub(super) fn beyond_the_noise(evidence: &Evidence, share: f64, n_parameters: us
 fn candidate(
     fit: &Fit,
     seen: &Examination,
-    first_order: &FirstOrder,
+    (first_order, folds): (&FirstOrder, &Folds),
     group: &Group,
     (first, borne_out): (bool, bool),
 ) -> Candidate {
@@ -421,10 +423,10 @@ fn candidate(
     let p_adjusted = tests().map(|s| s.p_adjusted).chain(both.map(|b| b.p_adjusted)).fold(1.0, f64::min);
     let effect = seen.named.effects[chosen];
     let held = match seen.nested.as_ref().filter(|_| first && both.is_none()) {
-        Some(nested) => seen.folds.chosen(seen.evidence, seen.named, nested),
-        None => seen.folds.given(seen.evidence, seen.named, chosen),
+        Some(nested) => folds.chosen(seen.evidence, seen.named, nested),
+        None => folds.given(seen.evidence, seen.named, chosen),
     };
-    let errors = seen.folds.errors(&held);
+    let errors = folds.errors(&held);
     let told = told(&score.covariance);
     // an order that leaves out the scatter of visits says nothing of the doubt: that is with it
     let tested = &seen.search.scores[chosen];

@@ -111,8 +111,6 @@ pub(crate) struct Examination<'a> {
     pub given: bool,
     /// Two effects that are named together.
     pub both: Option<Pair>,
-    /// What cross-validated errors are worked out from.
-    pub folds: folds::Folds,
 }
 
 impl<'a> Examination<'a> {
@@ -160,7 +158,6 @@ fn examine<'a>(
         given: behind.is_some(),
         nested: behind.or(nested),
         both: None,
-        folds: folds::Folds::new(fit, evidence),
         evidence,
         named,
         search,
@@ -330,22 +327,30 @@ impl<'a> Tested<'a> {
             gross.retain(|g| missed.iter().all(|m| m.hypothesis != g.hypothesis));
             gross.splice(0..0, missed);
         }
-        // what the refit still misses is used where the first candidate is proposed, and can be found meanwhile
-        let (mut out, remains) = rayon::join(
+        let may_refit = options.refit && fit.outcome.rms_um <= setup_mistakes::GROSS_UM;
+        let has_outliers = fit.rejected.values().any(Reason::is_outlier);
+        let leading = seen.groups.first().map(|group| seen.named.effects[group.first()].id.as_str());
+        // found meanwhile, as it takes as long: what the refit still misses, or the refit that shows which outliers come back
+        let of_refit = || match &refitted {
+            Some(again) => (Some(still_fails(again, machine, catalogue)), None),
+            None if may_refit && has_outliers => (None, leading.map(|id| (id, tried_with(subject, &[id])))),
+            None => (None, None),
+        };
+        let (mut out, (remains, tried)) = rayon::join(
             || assemble_diagnosis::put_together(subject, &seen, features, (decision, &beside), gross, options),
-            || refitted.as_ref().map(|again| still_fails(again, machine, catalogue)),
+            of_refit,
         );
         if out.mistake().is_none() {
             let gathered = beside.gathered.is_some();
             out.consequences = consequence::consequences(subject, &seen, generics, (&out.verdict, gathered))?;
         }
-        if options.refit
+        if may_refit
             && let Some(first) = out.candidates.first_mut()
-            && (first.proposed || fit.rejected.values().any(Reason::is_outlier))
-            && fit.outcome.rms_um <= setup_mistakes::GROSS_UM
+            && (first.proposed || has_outliers)
         {
-            let again = match refitted {
-                Some(again) if first.proposed => again,
+            let again = match (refitted, tried) {
+                (Some(again), _) if first.proposed => again,
+                (_, Some((id, again))) if id == first.effect => again?,
                 _ => tried_with(subject, &[first.effect.as_str()])?,
             };
             if first.proposed {
