@@ -205,8 +205,8 @@ fn stopped(stop: &Stop, added: &[&str], loaded: &Loaded) -> String {
             format!("a set-up mistake must be corrected first, and the touches measured again: {mistake}")
         }
         Stop::TooLarge(effect) => format!(
-            "the first proposal ({effect}) would be larger than usual by more than --at-most-size allows ({PLAUSIBLE:.0} times without it): another effect may look \
-             like it. `axiscal add` adds it all the same"
+            "the first proposal ({effect}) would be larger than --at-most-size allows ({PLAUSIBLE:.0} times the usual size where it is not given): another effect \
+             may look like it. `axiscal add` adds it all the same"
         ),
         Stop::AtMost(n) => format!("{n} effects were added, as many as --at-most allows"),
         Stop::Refused(refusal) => not_credible(refusal),

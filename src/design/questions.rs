@@ -91,6 +91,15 @@ impl Questions {
         Self { pairs: asked, suspects, says }
     }
 
+    /// These questions and others besides.
+    #[must_use]
+    pub fn and(mut self, other: Self) -> Self {
+        self.pairs.extend(other.pairs);
+        self.suspects.extend(other.suspects);
+        self.says = format!("{}; {}", self.says, other.says);
+        self
+    }
+
     /// The pairs that a plan confounds both ways, those first that would be seen best at typical size.
     #[must_use]
     pub fn of_plan(view: &LinearisedPlan) -> Self {

@@ -30,6 +30,8 @@ mod separating_touches;
 pub mod setup_mistakes;
 pub mod sketch;
 pub mod solving;
+#[cfg(test)]
+mod tests;
 mod turning_points;
 pub mod unresolved_pairs;
 pub mod verdict;
@@ -330,7 +332,7 @@ impl<'a> Tested<'a> {
         let may_refit = options.refit && fit.outcome.rms_um <= setup_mistakes::GROSS_UM;
         let has_outliers = fit.rejected.values().any(Reason::is_outlier);
         let leading = seen.groups.first().map(|group| seen.named.effects[group.first()].id.as_str());
-        // found meanwhile, as it takes as long: what the refit still misses, or the refit that shows which outliers come back
+        // worked out at the same time as the answer: what the refit still misses, or a refit that shows which outliers come back
         let of_refit = || match &refitted {
             Some(again) => (Some(still_fails(again, machine, catalogue)), None),
             None if may_refit && has_outliers => (None, leading.map(|id| (id, tried_with(subject, &[id])))),
@@ -375,8 +377,8 @@ fn raises_the_error(before: &Fit, after: &Fit) -> bool {
     squares(after) > squares(before)
 }
 
-/// The answer with all touches in, where touches that were not used lie together and one effect explains them as well: the only
-/// index position at another feed is no heap of bad touches.
+/// The answer with all touches in, where touches that were not used lie together and one effect explains them as well: the touches
+/// of the only index position at another feed are not bad touches.
 fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagnosis>> {
     let Subject { machine, catalogue, .. } = subject;
     let settings = Settings { all_in: true, ..subject.settings.clone() };

@@ -138,8 +138,9 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
 /// What is said of effects that do the same wherever the machine touches.
 pub const NEVER: &str = "no touches of this machine separate them: check at the machine which it is";
 
-/// What is said where the variations that were tried do not help, and a program of its own may.
-const LOOKED_FOR: &str = "no single change of these touches does; `axiscal plan-next` looks for a program that does";
+/// What is said where the variations that were tried do not help, and another program may.
+const LOOKED_FOR: &str =
+    "no single change of this program separates them; `axiscal plan-next` looks for another program that does";
 
 /// What is said where only variations of more than [`LONGEST_S`] help.
 const ONLY_LONG: &str =

@@ -327,3 +327,94 @@ fn fold(
 fn sum(error: &DVector<f64>, known: &[bool]) -> (f64, usize) {
     error.iter().zip(known).filter(|(_, k)| **k).fold((0.0, 0), |(ss, n), (e, _)| (ss + e * e, n + 1))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{noise, noise_matrix, rng};
+    use super::super::tests::ask;
+    use super::*;
+    use crate::search::{Origin, Score};
+
+    const FOLDS: usize = 12;
+    const ROWS: usize = 120;
+
+    fn two_candidates(a: &DVector<f64>, b: &DVector<f64>) -> Library {
+        let mut library = Library::new(ROWS);
+        library.push("a", Origin::Catalogue, &DMatrix::from_columns(std::slice::from_ref(a)));
+        library.push("b", Origin::Catalogue, &DMatrix::from_columns(std::slice::from_ref(b)));
+        library
+    }
+
+    fn group_of_rows() -> Vec<usize> {
+        (0..ROWS).map(|i| i / (ROWS / FOLDS)).collect()
+    }
+
+    /// The score tests of the rows that are not in a group, computed from these rows only.
+    fn scores_without(group: usize, a: &DMatrix<f64>, residual: &DVector<f64>, library: &Library) -> Vec<Score> {
+        let groups = group_of_rows();
+        let train: Vec<usize> = (0..ROWS).filter(|&i| groups[i] != group).collect();
+        let base = Basis::new(&a.select_rows(&train));
+        let residual = residual.select_rows(&train);
+        let mut own = Library::new(train.len());
+        for (i, candidate) in library.candidates().iter().enumerate() {
+            own.push(candidate.id.clone(), Origin::Catalogue, &library.columns(i, 0).select_rows(&train));
+        }
+        Search::new(ask(&residual, &base), &own).scores
+    }
+
+    /// The rival is better in a training set by less than the factor of the rule: the choice is that of all touches.
+    #[test]
+    fn a_rival_that_cannot_be_separated_does_not_change_the_choice() {
+        let (mut runs, mut folds_of_rival) = (0, 0);
+        for seed in 0..40 {
+            let mut rng = rng(300 + seed);
+            let known = noise_matrix(&mut rng, ROWS, 3);
+            let base = Basis::new(&known);
+            let a = noise(&mut rng, ROWS);
+            let b = &a + noise(&mut rng, ROWS) * 0.12;
+            let residual = noise(&mut rng, ROWS) - &a * 1.5;
+            let library = two_candidates(&a, &b);
+            if Search::new(ask(&residual, &base), &library).leader() != Some(0) {
+                continue;
+            }
+            let ahead: Vec<f64> = (0..FOLDS)
+                .map(|group| scores_without(group, &known, &residual, &library))
+                .map(|scores| scores[0].ln_p - scores[1].ln_p)
+                .collect();
+            assert!(ahead.iter().all(|ahead| *ahead < NOT_SEPARATED), "{seed}: {ahead:?}");
+            let rival = ahead.iter().filter(|ahead| **ahead > 0.0).count();
+            if rival == 0 {
+                continue;
+            }
+            (runs, folds_of_rival) = (runs + 1, folds_of_rival + rival);
+            let held = held_out(ask(&residual, &base), &library, &group_of_rows(), Choice::Redone);
+            let chosen: Vec<Option<usize>> = held.folds.iter().map(|fold| fold.chosen).collect();
+            assert_eq!(chosen, [Some(0); FOLDS], "{seed}: {ahead:?}");
+            assert!(held.falls(), "{seed}: {held:?}");
+        }
+        println!("the rival is ahead in {folds_of_rival} folds of {runs} runs");
+        assert!(runs >= 3, "the rule must decide: {runs}");
+    }
+
+    /// One group alone speaks for the first candidate. Without it the rival is clearly better, and is chosen.
+    #[test]
+    fn a_rival_that_is_clearly_better_without_a_group_is_chosen() {
+        let mut rng = rng(340);
+        let known = noise_matrix(&mut rng, ROWS, 3);
+        let base = Basis::new(&known);
+        let a = noise(&mut rng, ROWS);
+        let groups = group_of_rows();
+        // in group 0 the two differ much, and there only the first one acts
+        let apart = noise(&mut rng, ROWS);
+        let b = DVector::from_fn(ROWS, |i, _| a[i] + apart[i] * if groups[i] == 0 { 4.0 } else { 0.4 });
+        let residual =
+            noise(&mut rng, ROWS) * 0.5 - DVector::from_fn(ROWS, |i, _| 1.5 * if groups[i] == 0 { a[i] } else { b[i] });
+        let library = two_candidates(&a, &b);
+        assert_eq!(Search::new(ask(&residual, &base), &library).leader(), Some(0));
+        let scores = scores_without(0, &known, &residual, &library);
+        assert!(scores[0].ln_p - scores[1].ln_p > NOT_SEPARATED, "{scores:?}");
+        let held = held_out(ask(&residual, &base), &library, &groups, Choice::Redone);
+        assert_eq!(held.folds[0].chosen, Some(1));
+        assert!(held.folds[1..].iter().all(|fold| fold.chosen == Some(0)), "{:?}", held.folds);
+    }
+}

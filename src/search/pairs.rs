@@ -108,3 +108,188 @@ impl Search<'_> {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::{noise, noise_matrix, rng};
+    use super::super::tests::ask;
+    use super::*;
+    use crate::search::{Basis, Library, Origin};
+    use rand_chacha::ChaCha8Rng;
+
+    const ROWS: usize = 200;
+    const CANDIDATES: usize = 10;
+
+    /// Ten effects of one parameter each that these touches separate well.
+    fn simple_effects(rng: &mut ChaCha8Rng) -> Library {
+        let mut library = Library::new(ROWS);
+        for i in 0..CANDIDATES {
+            library.push(format!("c{i}"), Origin::Catalogue, &noise_matrix(rng, ROWS, 1));
+        }
+        library
+    }
+
+    fn column(library: &Library, candidate: usize) -> DVector<f64> {
+        library.columns(candidate, 0).column(0).into_owned()
+    }
+
+    /// Columns of some candidates side by side.
+    fn columns_of(library: &Library, candidates: &[usize]) -> DMatrix<f64> {
+        let columns: Vec<DVector<f64>> = candidates.iter().map(|&c| column(library, c)).collect();
+        DMatrix::from_columns(&columns)
+    }
+
+    fn all(library: &Library) -> Vec<usize> {
+        (0..library.candidates().len()).collect()
+    }
+
+    /// Sum of squares that columns take away from what a base leaves, by plain least squares.
+    fn taken_away(base: &Basis, residual: &DVector<f64>, columns: &DMatrix<f64>) -> f64 {
+        let columns = base.project_columns(columns);
+        let residual = base.project(residual);
+        let size = columns.clone().svd(true, true).solve(&residual, 1e-12).unwrap();
+        residual.norm_squared() - (&residual - columns * size).norm_squared()
+    }
+
+    #[test]
+    fn two_effects_that_act_at_once_are_found_as_the_pair() {
+        for seed in 0..20 {
+            let mut rng = rng(400 + seed);
+            let base = Basis::new(&noise_matrix(&mut rng, ROWS, 6));
+            let library = simple_effects(&mut rng);
+            let residual = noise(&mut rng, ROWS) - column(&library, 3) * 0.6 - column(&library, 7) * 1.0;
+            let search = Search::new(ask(&residual, &base), &library);
+            let pair = search.best_pair(&all(&library)).unwrap();
+            // the one that explains more by itself comes first
+            assert_eq!((pair.first, pair.second), (7, 3), "{seed}: {pair:?}");
+            assert_eq!(pair.n_parameters, 2);
+            let delta_ss = taken_away(&base, &residual, &columns_of(&library, &[3, 7]));
+            assert!((pair.delta_ss - delta_ss).abs() < 1e-9 * delta_ss, "{seed}: {pair:?}, refitted {delta_ss}");
+            let (n, left) = (ROWS as f64, base.project(&residual).norm_squared() - delta_ss);
+            let bic = n * (left / n).ln() + 2.0 * n.ln();
+            assert!((pair.bic - bic).abs() < 1e-8 * bic.abs(), "{seed}: {pair:?}, by hand {bic}");
+            assert!(pair.p_adjusted < 1e-6, "{seed}: {pair:?}");
+            assert!(all(&library).iter().all(|&c| search.bic(c) > pair.bic + 10.0), "{seed}: {pair:?}");
+            // only the candidates that are given are paired
+            let without: Vec<usize> = all(&library).into_iter().filter(|&c| c != 3).collect();
+            assert!(search.best_pair(&without).is_none_or(|pair| pair.second != 3 && pair.first != 3));
+        }
+    }
+
+    #[test]
+    fn of_three_effects_the_two_that_explain_most_are_the_pair() {
+        for seed in 0..10 {
+            let mut rng = rng(450 + seed);
+            let base = Basis::new(&noise_matrix(&mut rng, ROWS, 6));
+            let library = simple_effects(&mut rng);
+            let acts = column(&library, 3) * 1.1 + column(&library, 5) * 0.8 + column(&library, 7) * 1.4;
+            let residual = noise(&mut rng, ROWS) - acts;
+            let search = Search::new(ask(&residual, &base), &library);
+            let pair = search.best_pair(&all(&library)).unwrap();
+            assert!([(3, 7), (7, 3)].contains(&(pair.first, pair.second)), "{seed}: {pair:?}");
+            // the others would be pairs as well, were they alone
+            assert!(search.best_pair(&[3, 5]).is_some() && search.best_pair(&[5, 7]).is_some(), "{seed}");
+        }
+    }
+
+    /// Each of the two is four standard deviations. Among ten effects that is a pair, and among three thousand it is none.
+    #[test]
+    fn all_pairs_that_there_are_count() {
+        let mut rng = rng(460);
+        let base = Basis::new(&DMatrix::zeros(ROWS, 0));
+        let mut library = simple_effects(&mut rng);
+        let two = columns_of(&library, &[3, 7]);
+        let both = Basis::new(&two);
+        let left = both.project(&noise(&mut rng, ROWS));
+        let scale = ((ROWS - 2) as f64).sqrt() / left.norm();
+        // so that each takes away 16 after the other one
+        let gram = two.tr_mul(&two).try_inverse().unwrap();
+        let size = |i: usize| 4.0 * gram[(i, i)].sqrt();
+        let residual = left * scale - two.column(0) * size(0) - two.column(1) * size(1);
+        let pair = Search::new(ask(&residual, &base), &library).best_pair(&[3, 7]).unwrap();
+        let parts = [3, 7].map(|c| pair.delta_ss - taken_away(&base, &residual, &columns_of(&library, &[c])));
+        assert!(parts.iter().all(|part| (part - 16.0).abs() < 1e-9), "{parts:?}");
+        for i in CANDIDATES..3000 {
+            library.push(format!("c{i}"), Origin::Catalogue, &noise_matrix(&mut rng, ROWS, 1));
+        }
+        assert_eq!(Search::new(ask(&residual, &base), &library).best_pair(&[3, 7]), None);
+    }
+
+    /// By the limit for each of the two, one run of about a hundred has a second effect by accident, and none is clearly better.
+    #[test]
+    fn one_effect_alone_makes_no_pair() {
+        let (mut pairs, mut clearly_better) = (0, 0);
+        for seed in 0..200 {
+            let mut rng = rng(500 + seed);
+            let base = Basis::new(&noise_matrix(&mut rng, ROWS, 6));
+            let library = simple_effects(&mut rng);
+            let residual = noise(&mut rng, ROWS) - column(&library, 3);
+            let search = Search::new(ask(&residual, &base), &library);
+            let Some(pair) = search.best_pair(&all(&library)) else { continue };
+            pairs += 1;
+            clearly_better += usize::from(pair.bic < search.bic(3) - 10.0);
+        }
+        println!("one effect: {pairs} pairs of 200, {clearly_better} clearly better than the effect");
+        assert!(pairs <= 4, "{pairs}");
+        assert_eq!(clearly_better, 0);
+    }
+
+    #[test]
+    fn noise_makes_no_pair() {
+        let found = |seed: u64| {
+            let mut rng = rng(700 + seed);
+            let base = Basis::new(&noise_matrix(&mut rng, ROWS, 6));
+            let library = simple_effects(&mut rng);
+            let residual = noise(&mut rng, ROWS);
+            Search::new(ask(&residual, &base), &library).best_pair(&all(&library)).is_some()
+        };
+        assert_eq!((0..200).filter(|&seed| found(seed)).count(), 0);
+    }
+
+    /// Two effects of one parameter each act. The composite has the columns of both and some more.
+    fn with_composite(composite: impl Fn(&mut ChaCha8Rng, &Library) -> DMatrix<f64>) -> (f64, Pair) {
+        let mut rng = rng(901);
+        let base = Basis::new(&noise_matrix(&mut rng, ROWS, 6));
+        let mut library = simple_effects(&mut rng);
+        let columns = composite(&mut rng, &library);
+        library.push("composite", Origin::Catalogue, &columns);
+        let residual = noise(&mut rng, ROWS) - column(&library, 3) * 0.6 - column(&library, 7);
+        let search = Search::new(ask(&residual, &base), &library);
+        let pair = search.best_pair(&all(&library)).unwrap();
+        assert_eq!((pair.first.min(pair.second), pair.first.max(pair.second)), (3, 7), "{pair:?}");
+        (search.bic(CANDIDATES), pair)
+    }
+
+    #[test]
+    fn two_simple_effects_win_over_a_composite_of_more_parameters_only() {
+        // one parameter moves both as they act: it says the same with less
+        let (bic, pair) =
+            with_composite(|_, library| columns_of(library, &[3, 7]) * DMatrix::from_column_slice(2, 1, &[0.6, 1.0]));
+        assert!(bic < pair.bic, "{bic} {pair:?}");
+        // the same two parameters: neither is better
+        let (bic, pair) = with_composite(|_, library| columns_of(library, &[3, 7]));
+        assert!((bic - pair.bic).abs() < 1e-6, "{bic} {pair:?}");
+        // six more parameters that do not act
+        let (bic, pair) = with_composite(|rng, library| {
+            let mut columns = columns_of(library, &[3, 7]).resize_horizontally(8, 0.0);
+            columns.columns_mut(2, 6).copy_from(&noise_matrix(rng, ROWS, 6));
+            columns
+        });
+        assert!(bic > pair.bic + 10.0, "{bic} {pair:?}");
+    }
+
+    #[test]
+    fn a_scanned_shape_counts_as_a_parameter_of_the_pair() {
+        let mut rng = rng(902);
+        let base = Basis::new(&noise_matrix(&mut rng, ROWS, 6));
+        let mut library = simple_effects(&mut rng);
+        let variants: Vec<DMatrix<f64>> = (0..5).map(|_| noise_matrix(&mut rng, ROWS, 1)).collect();
+        let acts = variants[2].column(0).into_owned();
+        library.push_scan("scan", Origin::Catalogue, variants.into_iter().enumerate().map(|(i, c)| (i as f64, c)), 1);
+        let residual = noise(&mut rng, ROWS) - column(&library, 3) - acts;
+        let search = Search::new(ask(&residual, &base), &library);
+        let pair = search.best_pair(&all(&library)).unwrap();
+        assert_eq!(pair.first + pair.second, 3 + CANDIDATES, "{pair:?}");
+        assert_eq!((search.scores[CANDIDATES].variant, pair.n_parameters), (2, 3));
+    }
+}

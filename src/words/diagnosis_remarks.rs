@@ -73,7 +73,7 @@ fn of_candidate(first: &Candidate) -> Vec<String> {
     if !first.plausible {
         out.push(match first.same_as.len() {
             0 => format!("{} would be unusually large: another effect may look like it", first.effect),
-            _ => format!("{} would be unusually large: check the others of its group first", first.effect),
+            _ => format!("{} would be unusually large: look first at the other effects of its group", first.effect),
         });
     }
     for w in &first.weakens {

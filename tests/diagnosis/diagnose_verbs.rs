@@ -277,6 +277,27 @@ fn solve_names_a_group_and_not_its_first_member() {
     assert!(next.contains(" --effects backlash-y,") && next.contains("backlash-x"), "{next}");
 }
 
+/// An effect of thirteen times its usual size is added only where the user allows for so much.
+#[test]
+fn solve_adds_what_is_larger_than_usual_when_it_may() {
+    let folder = folder(
+        &["head", "table"],
+        "seed = 3\n[effects.backlash-y]\nbacklash_Y = 40.0\n[noise]\ntouch_um = 1.0\n",
+        None,
+    );
+    let at = folder.path();
+    let before = std::fs::read_to_string(at.join("study.toml")).unwrap();
+    let (s, _) = json(at, &["solve", "study.toml", "--yes"]);
+    assert!(
+        s["steps"].as_array().unwrap().is_empty() && s["stopped"].as_str().unwrap().contains("--at-most-size"),
+        "{s}"
+    );
+    assert_eq!(std::fs::read_to_string(at.join("study.toml")).unwrap(), before);
+    let (s, _) = json(at, &["solve", "study.toml", "--yes", "--at-most-size", "40"]);
+    assert_eq!(s["steps"][0]["added"], "backlash-y", "{s}");
+    assert_eq!(s["verdict"], "adequate", "{s}");
+}
+
 /// Half of a run-out of C is an offset of the block: no amplitude has a value of its own, and the whole has.
 #[test]
 fn what_has_no_size_alone_is_told_together_and_a_jump_by_its_neighbours() {

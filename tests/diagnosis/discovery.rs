@@ -1,5 +1,6 @@
 //! Hidden effects, at counts that a test can afford; bars are those of docs/discovery.md widened by the sampling error of
-//! these counts (three standard errors). `cargo run --release --example discovery` makes the full counts.
+//! these counts (three standard errors). Where all of these counts hit today, at most one may miss.
+//! `cargo run --release --example discovery` makes the full counts.
 
 use crate::discovery_bench::find;
 use crate::discovery_bench::measure::{Outcome, both_named, clean, planted, two};
@@ -19,6 +20,12 @@ fn check(what: &str, hits: usize, n: usize, bar: f64) {
     let share = hits as f64 / n as f64;
     println!("{what}: {hits} of {n} ({:.1} %), bar {:.1} %", 100.0 * share, 100.0 * bar);
     assert!(share >= at_least(bar, n), "{what}: {hits} of {n}");
+}
+
+/// The draws are fixed, and today all of them hit: at most one may miss.
+fn check_all_but_one(what: &str, hits: usize, n: usize) {
+    println!("{what}: {hits} of {n}");
+    assert!(hits + 1 >= n, "{what}: {hits} of {n}");
 }
 
 fn count(outcomes: &[Outcome], what: impl Fn(&Outcome) -> bool) -> usize {
@@ -54,20 +61,20 @@ fn clean_machines_are_adequate() {
     ] {
         let verdicts = clean(&bench, n, None, 103);
         let adequate = verdicts.iter().filter(|c| c.verdict == Verdict::Adequate).count();
-        check(&format!("adequate, {name}"), adequate, verdicts.len(), 0.95);
+        check_all_but_one(&format!("adequate, {name}"), adequate, verdicts.len());
     }
 }
 
 #[test]
 fn two_hidden_effects_are_both_named_on_full() {
     let found = two(&Bench::full(), 12, 104);
-    check("both named", found.iter().filter(|(t, s)| both_named(t, s)).count(), found.len(), 0.90);
+    check_all_but_one("both named", found.iter().filter(|(t, s)| both_named(t, s)).count(), found.len());
 }
 
 #[test]
 fn what_is_in_no_catalogue_is_never_adequate() {
     let bench = Bench::full();
-    let (mut right_of_all, mut all, mut bare) = (0, 0, 0);
+    let (mut right_of_all, mut all, mut bare, mut after_two) = (0, 0, 0, 0);
     for (kind, (name, _, smooth)) in strange::KINDS.iter().enumerate() {
         let seen = strange::run(&bench, kind, 4, 105 + 100 * kind as u64);
         for s in &seen {
@@ -77,6 +84,7 @@ fn what_is_in_no_catalogue_is_never_adequate() {
             }
         }
         bare += seen.iter().filter(|s| s.bare).count();
+        after_two += seen.iter().filter(|s| s.adequate_after_two).count();
         let right = seen.iter().filter(|s| s.right()).count();
         // of each kind: chips are on faces of many directions, and a bump may look like one of them
         check(&format!("right variable first, {name}"), right, seen.len(), 0.80);
@@ -84,6 +92,7 @@ fn what_is_in_no_catalogue_is_never_adequate() {
         all += seen.len();
     }
     check("right variable first", right_of_all, all, 0.90);
+    check("something is still missing with two names in the model", all - after_two, all, 0.95);
     // every one of them would be wrong
     check("no bare name", all - bare, all, 0.97);
 }

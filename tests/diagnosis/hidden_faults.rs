@@ -131,7 +131,8 @@ fn hidden_faults_are_in_the_first_groups() {
         );
     }
     println!("first group {}, first three {}", rate(first, outcomes.len()), rate(three, outcomes.len()));
-    assert!(judge::wilson(first, outcomes.len()).1 > 0.90, "{first} of {}", outcomes.len());
+    // the draws are fixed, and today all 24 are in the first group: at most one may move to the second or third group
+    assert!(first + 1 >= outcomes.len() && three == outcomes.len(), "{first} and {three} of {}", outcomes.len());
 }
 
 /// All eight kinds on the paper's plan of each machine; on `full` the example counts them. Ten index positions of a head cannot

@@ -20,3 +20,4 @@ mod solve;
 mod sphere;
 mod story;
 mod telescope;
+mod two_effects;

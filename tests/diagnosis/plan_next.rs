@@ -219,3 +219,26 @@ fn poses_at_which_an_effect_has_no_value_are_left_out_and_said() {
         assert!(touch["pose"]["B"].as_f64().unwrap() <= 0.0, "{touch}");
     }
 }
+
+/// What an earlier step added is asked about too, and not only what the last one did.
+#[test]
+fn groups_of_earlier_steps_are_asked_too() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    study(dir, "[effects.backlash-y]\nbacklash_Y = 6.0\n[effects.scale-z]\nEZZ = 80.0");
+    let next = ["plan-next", "study.toml", "--out", ".", "--controller", "linuxcnc", "--json"];
+    let asks = |answer: &serde_json::Value, id: &str| {
+        let of = |pair: &serde_json::Value| pair["one"] == id || pair["other"] == id;
+        answer["pairs"].as_array().unwrap().iter().any(of)
+    };
+    ok(dir, &["add", "study.toml", "backlash-y"]);
+    ok(dir, &["add", "study.toml", "scale-z"]);
+    let both = json(dir, &next);
+    assert!(asks(&both, "backlash-x") && asks(&both, "scale-z"), "{both}");
+    let groups = |answer: &serde_json::Value| answer["says"].as_str().unwrap().matches(" explains what").count();
+    assert_eq!(groups(&both), 2, "{both}");
+    // while an effect is missing, that is the question
+    ok(dir, &["remove", "study.toml", "scale-z"]);
+    let one = json(dir, &["plan-next", "study.toml", "--out", "again", "--controller", "linuxcnc", "--json"]);
+    assert_eq!(groups(&one), 1, "{one}");
+}

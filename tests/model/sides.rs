@@ -2,8 +2,9 @@
 //! by hand, for the virtual machine and for the model.
 //!
 //! A coordinate says where the tool is over the workpiece. Head: the ball goes along with it. Table: the block goes the other way.
-//! What is written of a coordinate (a scale, a play, a screw) therefore acts alike on both sides; what is written of a place (a part
-//! sinks, leans, lies to one side) does not. `trunnion` has X, Y and Z in the head, `swivel-head` has X and Y in the table.
+//! An error of the coordinate that the control reads (backlash, a lost position, scales that grow with the room) therefore acts
+//! alike on both sides. An error of the position that a part reaches (`scale-x`, squareness, straightness, sag) changes its sign or
+//! its size with the side. `trunnion` has X, Y and Z in the head, `swivel-head` has X and Y in the table.
 //!
 //! A reading is recorded less nominal along the outward normal: positive where the ball stops early.
 

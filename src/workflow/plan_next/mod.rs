@@ -11,6 +11,7 @@ use super::{Environment, Loaded};
 use crate::design::questions::{Pair, Questions, Suspect};
 use crate::design::{self, LinearisedPlan, Room};
 use crate::diag::{Failure, Finding, Result, source};
+use crate::diagnose::unresolved_pairs;
 use crate::diagnose::verdict::{NotNamed, TooLittle, Unexplained};
 use crate::diagnose::{Diagnosis, Options, Verdict, sketch::sketch};
 use crate::fit::candidates::NoValue;
@@ -152,6 +153,8 @@ struct Open {
     settings: Settings,
     fit: Fit,
     found: Diagnosis,
+    /// What else is open: groups of other steps of the history.
+    others: Vec<unresolved_pairs::Open>,
 }
 
 impl Open {
@@ -180,27 +183,45 @@ impl Open {
             return Ok(Err(NoProgram::new(says, help)));
         }
         if request.effects.is_empty() && !open.found.leaves_open() {
-            // what was added last may stand for others that the same touches could not tell from it: still an open question
-            let added = last_added(loaded, env)?;
-            let mut before = open.settings.clone();
-            before.effects.retain(|e| !added.contains(e));
-            if before.effects.len() < open.settings.effects.len() {
-                let then = Self::look(loaded, before)?;
-                let left_open = &then.found.open;
-                let group = left_open.suspects.iter().any(|s| added.contains(&s.id)) && !left_open.pairs.is_empty();
-                if then.found.leaves_open() && group {
-                    open = then;
-                }
-            }
+            open = open.with_groups_of_history(loaded, env)?;
         }
         Ok(Ok(open))
+    }
+
+    /// What a step added may stand for others that the same touches could not tell from it: still open questions. Of each step its
+    /// group is looked for beside the rest of the model; the model that is asked has none of those that are in question.
+    fn with_groups_of_history(mut self, loaded: &Loaded, env: &dyn Environment) -> Result<Self> {
+        let without = |added: &[String]| {
+            let mut settings = self.settings.clone();
+            settings.effects.retain(|e| !added.contains(e));
+            settings
+        };
+        let steps = added(loaded, env)?;
+        let looks: Vec<Self> =
+            steps.par_iter().map(|added| Self::look(loaded, without(added))).collect::<Result<_>>()?;
+        let is_open = |(added, then): &(Vec<String>, Self)| {
+            let left_open = &then.found.open;
+            let group = left_open.suspects.iter().any(|s| added.contains(&s.id)) && !left_open.pairs.is_empty();
+            then.found.leaves_open() && group
+        };
+        let mut open: Vec<(Vec<String>, Self)> = steps.into_iter().zip(looks).filter(is_open).collect();
+        let Some((_, mut first)) = open.pop() else { return Ok(self) };
+        for (added, then) in open {
+            first.settings.effects.retain(|e| !added.contains(e));
+            first.others.push(then.found.open);
+        }
+        if first.settings.effects.len() < self.settings.effects.len() {
+            first.fit = loaded.fit(&first.settings)?;
+            self = first;
+        }
+        Ok(self)
     }
 
     fn look(loaded: &Loaded, settings: Settings) -> Result<Self> {
         let fit = loaded.fit(&settings)?;
         let options = Options { power: false, refit: false, ..Options::default() };
         let found = loaded.diagnose(&settings, &fit, &options)?;
-        Ok(Self { settings, fit, found })
+        Ok(Self { settings, fit, found, others: Vec::new() })
     }
 
     fn unexplained(&self, request: &Request) -> Option<&Unexplained> {
@@ -249,7 +270,9 @@ impl Open {
         if found.leaves_open() {
             // as its tests allow for it
             setting.noise.tau_mm = found.open.tau_mm;
-            return Ok(Questions::left_open(found.open.suspects.clone(), &found.open.pairs));
+            let each = std::iter::once(&found.open).chain(&self.others);
+            let asked = each.map(|open| Questions::left_open(open.suspects.clone(), &open.pairs));
+            return Ok(asked.reduce(Questions::and).unwrap_or_default());
         }
         let view = LinearisedPlan::new(&setting.task, &setting.runs, &setting.known, setting.noise)?;
         let left_out = view.left_out.iter().map(NoValue::left_out);
@@ -395,9 +418,19 @@ impl Sketched {
     }
 }
 
-/// Effects of the study's model that the last step of its history put there.
-fn last_added(loaded: &Loaded, env: &dyn Environment) -> Result<Vec<String>> {
+/// Effects of the study's model that steps of its history put there, step by step.
+fn added(loaded: &Loaded, env: &dyn Environment) -> Result<Vec<Vec<String>>> {
     let history = read_history(&loaded.path, env)?.unwrap_or_default();
-    let last = history.steps.last().filter(|s| s.effects == loaded.study.effects);
-    Ok(last.map_or_else(Vec::new, |s| s.added.clone()))
+    let mut out: Vec<Vec<String>> = Vec::new();
+    // what was taken out and added again counts where it was added last
+    for step in history.steps.iter().rev() {
+        let is_new =
+            |id: &&String| loaded.study.effects.contains(id) && !out.iter().flatten().any(|other| other == *id);
+        let added: Vec<String> = step.added.iter().filter(is_new).cloned().collect();
+        if !added.is_empty() {
+            out.push(added);
+        }
+    }
+    out.reverse();
+    Ok(out)
 }

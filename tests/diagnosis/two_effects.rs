@@ -1,0 +1,90 @@
+//! Two effects that act at once, where no single effect explains the touches. The case is a folder beside the project.
+
+use crate::common::verbs::{json, ok};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+const MACHINE: [&str; 4] = ["--machine", "shop-ac", "--machines", "machines.toml"];
+
+/// A copy of the case `two-effects-one-block`, or nothing where it is missing. The cases are beside the shared data.
+fn case() -> Option<tempfile::TempDir> {
+    let data = std::env::var_os("AXISCAL_SHARED_DATA")
+        .map_or_else(|| PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/data"), PathBuf::from);
+    let case = data.join("../cases/two-effects-one-block");
+    if !case.is_dir() {
+        let missing = format!("skipped: {} is missing (AXISCAL_SHARED_DATA sets another folder)", case.display());
+        assert!(std::env::var_os("AXISCAL_REQUIRE_SHARED_DATA").is_none(), "{missing}");
+        println!("{missing}");
+        return None;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    for file in ["machines.toml", "program.toml", "wrong.toml"] {
+        std::fs::copy(case.join(file), folder.path().join(file)).unwrap();
+    }
+    Some(folder)
+}
+
+/// The touches of the case and their study, made as its `run.sh` makes them.
+fn measure(at: &Path) {
+    let run = |verb: &[&str], out: &str| {
+        ok(at, &[verb, &MACHINE, &["--controller", "linuxcnc", "--out", out]].concat());
+    };
+    run(&["generate", "--program", "program.toml"], "job");
+    run(&["simulate", "--plan", "job/one.plan.json", "--scenario", "wrong.toml"], "one.log");
+    run(&["new", "--plan", "job/one.plan.json", "--log", "one.log"], "study.toml");
+}
+
+/// Ids of the effects that these touches cannot separate from a candidate, with its own.
+fn group(candidate: &Value) -> Vec<&str> {
+    let alike = candidate["same_as"].as_array().unwrap().iter();
+    std::iter::once(&candidate["effect"]).chain(alike).map(|id| id.as_str().unwrap()).collect()
+}
+
+fn number(value: &Value, key: &str) -> f64 {
+    value[key].as_f64().unwrap_or_else(|| panic!("no number {key:?} in {value}"))
+}
+
+/// Planted: `scale-y` with 60 µm/m and `backlash-a` with 80 µrad; the touches scatter by 0.5 µm and the index positions by 0.2 µm.
+#[test]
+fn two_effects_that_explain_the_touches_together_are_named_together() {
+    let Some(folder) = case() else { return };
+    let at = folder.path();
+    measure(at);
+    let (d, code) = json(at, &["diagnose", "study.toml"]);
+    assert_eq!((d["verdict"].as_str(), code), (Some("missing-effect"), 1), "{}", d["says"]);
+    let [first, second] = [&d["candidates"][0], &d["candidates"][1]];
+    assert_eq!(first["together_with"], second["effect"], "{}", d["says"]);
+    assert_eq!(first["proposed"], true);
+    let both = [group(first), group(second)];
+    assert!(both[0].contains(&"scale-y") && both[1].contains(&"backlash-a"), "{both:?}");
+    // with both effects no more is left than the touches and the index positions scatter, which is less than the probe noise
+    let [before, noise, after] = [number(&d, "rms_um"), number(&d, "noise_um"), number(first, "rms_after_um")];
+    assert!(before > 1.5 * noise, "{before} {noise}");
+    assert!(after > 0.4 && after < 0.5f64.hypot(0.2) * 1.1 && after < noise, "{after}, noise {noise}");
+    assert_eq!(first["remains"], false, "{first}");
+    // and the message states both names and the error that is left
+    let says = d["says"].as_str().unwrap();
+    for part in ["scale-y", "backlash-a", "both", &format!("{before:.2}"), &format!("{after:.2} µm")] {
+        assert!(says.contains(part), "{part:?} is not in {says:?}");
+    }
+}
+
+/// With both in the model their sizes are those that were planted, and nothing is missing.
+#[test]
+fn with_both_effects_the_model_is_complete_and_their_sizes_are_right() {
+    let Some(folder) = case() else { return };
+    let at = folder.path();
+    measure(at);
+    for effect in ["scale-y", "backlash-a"] {
+        ok(at, &["add", "study.toml", effect]);
+    }
+    let (d, code) = json(at, &["diagnose", "study.toml"]);
+    assert_eq!((d["verdict"].as_str(), code), (Some("adequate"), 0), "{}", d["says"]);
+    let (fit, _) = json(at, &["identify", "study.toml"]);
+    for (name, planted) in [("EYY", 60.0), ("backlash_A", 80.0)] {
+        let all = fit["parameters"].as_array().unwrap();
+        let p = all.iter().find(|p| p["name"] == name).unwrap_or_else(|| panic!("no {name} in {fit}"));
+        let (value, sigma) = (number(p, "value"), number(p, "sigma"));
+        assert!((value - planted).abs() < 3.0 * sigma && sigma < 0.1 * planted, "{name}: {value} ± {sigma}");
+    }
+}
