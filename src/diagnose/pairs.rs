@@ -83,23 +83,17 @@ pub(super) fn in_front(groups: &mut Vec<Group>, seen: &crate::search::Search, pa
 mod tests {
     use super::*;
     use crate::search::Basis;
+    use crate::search::testing::{noise_matrix, rng};
     use nalgebra::DMatrix;
-    use rand::SeedableRng;
-    use rand_chacha::ChaCha8Rng;
-    use rand_distr::{Distribution, StandardNormal};
 
     const ROWS: usize = 200;
-
-    fn noise_matrix(rng: &mut ChaCha8Rng, columns: usize) -> DMatrix<f64> {
-        DMatrix::from_fn(ROWS, columns, |_, _| StandardNormal.sample(rng))
-    }
 
     /// Two effects act, each has a twin, and a third effect is stronger than both of them alone.
     #[test]
     fn the_groups_of_the_pair_come_first_and_only_once() {
-        let mut rng = ChaCha8Rng::seed_from_u64(41);
-        let base = Basis::new(&noise_matrix(&mut rng, 4));
-        let columns: Vec<DMatrix<f64>> = (0..6).map(|_| noise_matrix(&mut rng, 1)).collect();
+        let mut rng = rng(41);
+        let base = Basis::new(&noise_matrix(&mut rng, ROWS, 4));
+        let columns: Vec<DMatrix<f64>> = (0..6).map(|_| noise_matrix(&mut rng, ROWS, 1)).collect();
         let mut library = Library::new(ROWS);
         for (i, column) in columns.iter().enumerate() {
             library.push(format!("c{i}"), Origin::Catalogue, column);
@@ -107,7 +101,7 @@ mod tests {
         library.push("twin of c1", Origin::Catalogue, &(&columns[1] * 2.0));
         library.push("twin of c2", Origin::Catalogue, &(&columns[2] * -0.5));
         let act = &columns[0] * 2.0 + &columns[1] + &columns[2] * 0.7;
-        let residual = (noise_matrix(&mut rng, 1) - act).column(0).into_owned();
+        let residual = (noise_matrix(&mut rng, ROWS, 1) - act).column(0).into_owned();
         let search = Search::new(Question { residual: &residual, base: &base, pure: None }, &library);
         let pair = search.best_pair(&[1, 2]).unwrap();
         let twin_of = |candidate: usize| candidate + 5;

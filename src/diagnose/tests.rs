@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::diag::source;
-use crate::log::{Status, Touch};
+use crate::log::match_to_plan;
 use crate::model::data::{Run, assemble};
 use crate::{machine, program, simulate};
 
@@ -14,19 +14,8 @@ fn fit_with(effects: &[&str]) -> Fit {
     let plan = program::plan_without_path(&machine, &spec).unwrap();
     let text = "seed = 3\n[effects.scale-x]\nEXX = 100.0\n[noise]\ntouch_um = 0.5\n";
     let scenario = simulate::scenario::parse(&source("wrong.toml", text), &machine).unwrap().0;
-    let (raw, _) = simulate::run(&machine, &plan, &scenario, None).unwrap();
-    let touches: Vec<Touch> = raw
-        .iter()
-        .map(|touch| Touch {
-            id: touch.id.unwrap(),
-            position: touch.position,
-            status: Status::Hit,
-            time_s: touch.time_s,
-            temperature_deg_c: touch.temperature_deg_c,
-            digit_mm: None,
-            line: touch.line,
-        })
-        .collect();
+    let raw = simulate::run(&machine, &plan, &scenario, None).unwrap().0;
+    let touches = match_to_plan(&machine, &plan, raw).unwrap().0;
     let data = assemble(&machine, &[Run { plan: &plan, touches: &touches, mounting: None, started_s: None }]);
     let settings = Settings {
         effects: effects.iter().map(|id| (*id).to_owned()).collect(),

@@ -23,7 +23,7 @@ pub mod score;
 mod shape_tests;
 mod shapes;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 #[cfg(test)]
 mod tests;
 

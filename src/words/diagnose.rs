@@ -1,8 +1,8 @@
 //! Findings in the words of the shop floor.
 
+use super::oversized;
 use crate::diagnose::features::direction_words;
 use crate::diagnose::next_step::MachineCheck;
-use crate::diagnose::oversized::Oversized;
 use crate::diagnose::verdict::{Missing, NameDoubt, TooLittle, Verdict};
 use crate::diagnose::{Diagnosis, Subject};
 use crate::fit::{Fit, VisitSource};
@@ -243,46 +243,8 @@ pub(crate) fn verdict(d: &Diagnosis, fit: &Fit) -> String {
     // beside a set-up mistake nothing else counts
     match d.oversized.first().filter(|_| d.mistake().is_none()) {
         None => says,
-        Some(o) => format!("{says} {}{}", oversized(o, &d.verdict), more_oversized(d.oversized.len() - 1)),
+        Some(o) => format!("{says} {}{}", oversized::finding(o, &d.verdict), oversized::more(d.oversized.len() - 1)),
     }
-}
-
-/// A value that is far larger than machines have it. Only a complete model shows its cause. The check stands in the next step where
-/// the model is complete.
-fn oversized(o: &Oversized, verdict: &Verdict) -> String {
-    let Oversized { parameter, effect, value, unit, times, cause, check, .. } = o;
-    let cause = cause.trim_end_matches('.');
-    let check = check.trim_end_matches('.');
-    let finding = if o.wrong_sign {
-        format!("But {parameter} = {value:.3} {unit}: {effect} cannot be negative.")
-    } else if o.combined {
-        let most = crate::units::significant(*value, 3);
-        format!("But {effect} ({parameter}) moves a touch by {most} µm, {times:.0} times its usual size.")
-    } else {
-        format!("But {parameter} = {value:.3} {unit} is {times:.0} times the usual size of {effect}.")
-    };
-    match verdict {
-        Verdict::Adequate => format!("{finding} Probable cause: {cause}."),
-        Verdict::TooLittleData(_) => format!("{finding} Probable cause: {cause}. Check at the machine: {check}."),
-        Verdict::MissingEffect(_) | Verdict::Unexplained(_) => format!(
-            "{finding} This may only stand for what the model lacks. Look at it again when the model is complete. If it \
-             stays so, check at the machine: {check}."
-        ),
-    }
-}
-
-fn more_oversized(more: usize) -> String {
-    match more {
-        0 => String::new(),
-        1 => " 1 more value is too large (--json lists it).".to_owned(),
-        n => format!(" {n} more values are too large (--json lists them)."),
-    }
-}
-
-/// What to do about it.
-#[must_use]
-pub fn check_size(o: &Oversized) -> String {
-    format!("check {} before you use these values. {}", o.effect, o.check)
 }
 
 fn answer(d: &Diagnosis, fit: &Fit) -> String {
@@ -571,39 +533,5 @@ mod tests {
         assert_eq!(one_of("backlash-x", &[]), "backlash-x");
         assert_eq!(plain("sX*C"), "the product of the direction of X's last motion and C");
         assert_eq!(plain("time*block"), "time and block");
-    }
-
-    fn large() -> Oversized {
-        Oversized {
-            parameter: "EA0C".to_owned(),
-            effect: "location-c".to_owned(),
-            value: 0.015,
-            sigma: 0.0001,
-            unit: "deg".to_owned(),
-            times: 8.3,
-            wrong_sign: false,
-            combined: false,
-            cause: "The position of C in the machine file is wrong".to_owned(),
-            check: "Turn C by 180 degrees against a fixed indicator".to_owned(),
-        }
-    }
-
-    #[test]
-    fn a_value_that_is_too_large_has_a_cause_where_the_model_is_complete() {
-        let says = oversized(&large(), &Verdict::Adequate);
-        assert!(says.contains("8 times the usual size of location-c. Probable cause: The position of C"), "{says}");
-        // the next step has the check
-        assert!(check_size(&large()).contains("Turn C by 180 degrees"));
-        let says = oversized(&large(), &Verdict::TooLittleData(TooLittle::NoneUsed { excluded: 3 }));
-        assert!(says.contains("Probable cause: The position of C") && says.contains("Turn C by 180 degrees"), "{says}");
-    }
-
-    #[test]
-    fn an_oversized_value_of_an_incomplete_model_has_no_cause_yet() {
-        let says = oversized(&large(), &Verdict::MissingEffect(Missing::Effect(None)));
-        assert!(!says.contains("The position of C") && !says.contains("cause"), "{says}");
-        assert!(says.contains("may only stand for what the model lacks") && says.contains("Turn C by"), "{says}");
-        assert_eq!(more_oversized(0), "");
-        assert!(more_oversized(2).contains("2 more values"));
     }
 }

@@ -10,5 +10,6 @@ pub(crate) mod log;
 pub(crate) mod next_calls;
 pub(crate) mod next_steps;
 mod not_explained;
+mod oversized;
 pub(crate) mod standing;
 pub(crate) mod why;

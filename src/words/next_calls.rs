@@ -95,7 +95,7 @@ pub(crate) fn lines(found: &Diagnosis, loaded: &Loaded) -> Vec<String> {
             std::iter::once(what).chain(sketchable.then(sketch)).collect()
         }
         NextStep::RicherProgram => richer_program(loaded).map(|call| format!("next: {call}")).into_iter().collect(),
-        NextStep::CheckSize(o) => vec![format!("next: {}", words::check_size(o))],
+        NextStep::CheckSize(o) => vec![format!("next: {}", super::oversized::check(o))],
         NextStep::Nothing => Vec::new(),
     }
 }

@@ -104,7 +104,7 @@ pub(crate) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
         },
         Verdict::Adequate => {
             if let NextStep::CheckSize(o) = d.next_step() {
-                let how = capital(&crate::words::diagnose::check_size(o));
+                let how = capital(&super::oversized::check(o));
                 out.push(Next::new(format!("Check {}: it is far too large", o.parameter), how, ""));
             }
             settled(m, headline, parameters, c, &mut out);

@@ -93,7 +93,7 @@ fn what_is_in_no_catalogue_is_never_adequate() {
     }
     check("right variable first", right_of_all, all, 0.90);
     check("something is still missing with two names in the model", all - after_two, all, 0.95);
-    // every one of them would be wrong
+    // every one of them would be wrong, or a part of what acts
     check("no bare name", all - bare, all, 0.97);
 }
 

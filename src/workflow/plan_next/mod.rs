@@ -190,7 +190,7 @@ impl Open {
 
     /// What a step added may stand for others that the same touches could not tell from it: still open questions. Of each step its
     /// group is looked for beside the rest of the model; the model that is asked has none of those that are in question.
-    fn with_groups_of_history(mut self, loaded: &Loaded, env: &dyn Environment) -> Result<Self> {
+    fn with_groups_of_history(self, loaded: &Loaded, env: &dyn Environment) -> Result<Self> {
         let without = |added: &[String]| {
             let mut settings = self.settings.clone();
             settings.effects.retain(|e| !added.contains(e));
@@ -210,11 +210,10 @@ impl Open {
             first.settings.effects.retain(|e| !added.contains(e));
             first.others.push(then.found.open);
         }
-        if first.settings.effects.len() < self.settings.effects.len() {
+        if !first.others.is_empty() {
             first.fit = loaded.fit(&first.settings)?;
-            self = first;
         }
-        Ok(self)
+        Ok(first)
     }
 
     fn look(loaded: &Loaded, settings: Settings) -> Result<Self> {
