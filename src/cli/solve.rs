@@ -31,7 +31,7 @@ pub struct Args {
     #[arg(long, value_name = "N", default_value_t = 6)]
     pub at_most: usize,
     /// Accept an effect of up to so many times its usual size
-    #[arg(long, value_name = "N", default_value_t = PLAUSIBLE)]
+    #[arg(long, value_name = "N", default_value_t = PLAUSIBLE, value_parser = times)]
     pub at_most_size: f64,
     /// All that stays open, not the first three only
     #[arg(long, short)]
@@ -195,6 +195,14 @@ fn cross_validated(found: &Diagnosis) -> String {
     let doubt = se.map_or_else(String::new, |se| format!(" ± {} (one standard error)", digits(se, Some(se))));
     let rms = se.map_or_else(|| significant(rms_um), |se| digits(rms_um, Some(se)));
     format!(", cross-validated {rms}{doubt} µm")
+}
+
+/// So many times a usual size.
+fn times(text: &str) -> std::result::Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(times) if times.is_finite() && times > 0.0 => Ok(times),
+        _ => Err("write a number above 0, 5 for example".to_owned()),
+    }
 }
 
 /// Why the loop ended, in words.
