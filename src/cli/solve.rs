@@ -442,10 +442,9 @@ fn tell(s: &Solution, fit: &Fit, loaded: &Loaded, (mistaken, verbose): (bool, bo
     if !open.is_empty() {
         io.say(first_remarks(&open, verbose).trim_end());
     }
-    // a further program is asked for the names themselves: the study holds one of them by now
-    for step in s.steps.iter().filter(|step| !step.same_as.is_empty() && !step.never_parted) {
-        let asked: Vec<&str> = std::iter::once(&step.added).chain(&step.same_as).map(String::as_str).collect();
-        io.say_as_it_is(format!("next: {}", crate::words::next_calls::plan_next_for(loaded, &asked)));
+    // it asks about the group of every step that the history has
+    if s.steps.iter().any(|step| !step.same_as.is_empty() && !step.never_parted) {
+        io.say_as_it_is(format!("next: {}", crate::words::next_calls::plan_next(loaded)));
     }
     io.say_as_it_is(format!("next: axiscal history {}", crate::words::command::quoted_path(&loaded.path)));
 }

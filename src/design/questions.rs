@@ -60,9 +60,10 @@ impl Questions {
         Self { pairs, suspects: Vec::new(), says: "effects named in the call, each at its usual size".into() }
     }
 
-    /// What a diagnosis leaves open: every pair of suspects that its data do not tell apart. The first suspect leads.
+    /// What a diagnosis leaves open: every pair of suspects that its data do not tell apart. The first suspect leads; `including`:
+    /// effects of which it is a special case.
     #[must_use]
-    pub fn left_open(mut suspects: Vec<Suspect>, pairs: &[(usize, usize)]) -> Self {
+    pub fn left_open(mut suspects: Vec<Suspect>, pairs: &[(usize, usize)], including: &[String]) -> Self {
         for s in &mut suspects {
             // a size beyond belief is that of a trace which hardly differs from the model's: not to be counted on
             let most = s.size.amax();
@@ -78,7 +79,14 @@ impl Questions {
             .filter_map(|&(a, b)| Some(Pair { one: id(a)?, other: Some(id(b)?) }))
             .collect();
         if asked.is_empty() {
-            let says = format!("the data name {leader} alone: further touches confirm it");
+            let says = match including {
+                [] => format!("the data name {leader} alone: further touches confirm it"),
+                _ => format!(
+                    "{leader} explains what the model leaves over; it is a special case of {}, so that it may be a part of one of \
+                     them: further touches confirm it",
+                    including.join(", ")
+                ),
+            };
             return Self { pairs: vec![Pair { one: leader, other: None }], suspects, says };
         }
         let rivals: Vec<String> = suspects[1..].iter().map(|s| s.id.clone()).collect();

@@ -91,6 +91,13 @@ impl Diagnosis {
         matches!(self.verdict, Verdict::MissingEffect(_) | Verdict::Unexplained(_)) && !self.open.suspects.is_empty()
     }
 
+    /// The effect that is named together with this one.
+    #[must_use]
+    pub fn named_with(&self, first: &Candidate) -> Option<&Candidate> {
+        let other = first.together_with.as_ref()?;
+        self.candidates.iter().find(|c| c.effect == *other)
+    }
+
     /// The effect that passes the test with all candidates counted in and that unused measurements do not confirm.
     #[must_use]
     pub fn in_question(&self) -> Option<&Candidate> {

@@ -68,8 +68,12 @@ impl Diagnosis {
                     None => NextStep::Add(first),
                     Some(other) => NextStep::AddOrCheck(first, other),
                 },
-                Some(first) if first.never_parted => NextStep::CheckWhich(first),
-                Some(first) => NextStep::Separate(first),
+                Some(first) => match self.named_with(first).filter(|second| second.same_as.is_empty()) {
+                    // it is clear already, and with it in the model the first one's group is judged again
+                    Some(second) => NextStep::Add(second),
+                    None if first.never_parted => NextStep::CheckWhich(first),
+                    None => NextStep::Separate(first),
+                },
             },
             Verdict::Unexplained(found) => {
                 let formula = found.sketchable && self.verdict.moved_block().is_none();

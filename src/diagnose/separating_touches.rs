@@ -31,7 +31,13 @@ pub(super) struct Separating {
     pub never: bool,
 }
 
-/// One for each group.
+/// What is said of two effects that are named together.
+fn after_the_other(other: &str) -> Separating {
+    let says = format!("add {other} first: with it in the model `axiscal diagnose` says which touches separate these");
+    Separating { says, never: false }
+}
+
+/// One for each group. The group of an effect that is named together with another is judged when that other is in the model.
 pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> Vec<Separating> {
     let found = |g: &Group| g.members.iter().any(|m| seen.search.scores[m.candidate].p_adjusted < FAMILY_LEVEL);
     let asked: Vec<bool> = seen.groups.iter().map(|g| g.members.len() > 1 && found(g)).collect();
@@ -39,8 +45,11 @@ pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> 
         Some(planned) if asked.contains(&true) => tried(subject, seen, planned, &asked).unwrap_or_default(),
         _ => Vec::new(),
     };
-    let each = seen.groups.iter().zip(&asked).map(|(group, asked)| {
-        if *asked && !tried.is_empty() {
+    let named = seen.first_names();
+    let each = seen.groups.iter().zip(&asked).enumerate().map(|(i, (group, asked))| {
+        if let (Some(_), true, [first, second]) = (named.get(i), group.members.len() > 1, &named[..]) {
+            after_the_other(if i == 0 { second } else { first })
+        } else if *asked && !tried.is_empty() {
             by_variation(seen, group, &tried)
         } else {
             Separating { says: by_difference(subject, seen, group), never: false }

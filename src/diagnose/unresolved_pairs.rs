@@ -2,7 +2,7 @@
 
 use super::Examination;
 use crate::design::questions::Suspect;
-use crate::search::groups::{AS_LIKELY, Group};
+use crate::search::groups::{AS_LIKELY, Group, Member};
 
 /// Effects of which the data cannot say which one acts.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -11,6 +11,8 @@ pub struct Open {
     pub suspects: Vec<Suspect>,
     /// Pairs of them that these touches do not tell apart.
     pub pairs: Vec<(usize, usize)>,
+    /// Effects of the first group of which the first effect is a special case: no touches separate them.
+    pub including: Vec<String>,
     /// Scatter of index visits that the tests allowed for, mm.
     pub tau_mm: f64,
 }
@@ -33,8 +35,10 @@ pub(super) fn open(seen: &Examination) -> Open {
     };
     // no touches separate an effect from one of which it is a special case: the simpler one is asked about
     let simplest = &seen.named.effects[first.first()].id;
-    let own = first.members.iter().filter(|m| !seen.named.effects[m.candidate].includes.contains(simplest));
-    let mut suspects: Vec<Suspect> = own.map(|m| suspect(m.candidate)).collect();
+    let includes = |m: &&Member| seen.named.effects[m.candidate].includes.contains(simplest);
+    let (including, own): (Vec<&Member>, Vec<&Member>) = first.members.iter().partition(includes);
+    let including = including.iter().map(|m| seen.named.effects[m.candidate].id.clone()).collect();
+    let mut suspects: Vec<Suspect> = own.iter().map(|m| suspect(m.candidate)).collect();
     let n = suspects.len();
     let mut pairs: Vec<(usize, usize)> = (0..n).flat_map(|a| (a + 1..n).map(move |b| (a, b))).collect();
     for group in seen.groups[1..].iter().filter(tied) {
@@ -42,5 +46,5 @@ pub(super) fn open(seen: &Examination) -> Open {
         suspects.extend(group.members.iter().map(|m| suspect(m.candidate)));
         pairs.extend((0..n).flat_map(|a| (from..suspects.len()).map(move |b| (a, b))));
     }
-    Open { suspects, pairs, tau_mm: seen.evidence.tau_mm }
+    Open { suspects, pairs, including, tau_mm: seen.evidence.tau_mm }
 }

@@ -21,15 +21,8 @@ fn with_control(loaded: &Loaded, call: impl Fn(&str) -> String) -> String {
 /// The call of `plan-next`, with the study's own control.
 #[must_use]
 pub(crate) fn plan_next(loaded: &Loaded) -> String {
-    plan_next_for(loaded, &[])
-}
-
-/// The same for effects that are to be told apart.
-#[must_use]
-pub(crate) fn plan_next_for(loaded: &Loaded, effects: &[&str]) -> String {
-    let which = if effects.is_empty() { String::new() } else { format!(" --effects {}", effects.join(",")) };
     let study = quoted(&loaded.path);
-    with_control(loaded, |name| format!("axiscal plan-next {study} --out next --controller {name}{which}"))
+    with_control(loaded, |name| format!("axiscal plan-next {study} --out next --controller {name}"))
 }
 
 /// The call that writes the program in whose poses every known effect shows, where this machine has one.

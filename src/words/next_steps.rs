@@ -76,7 +76,8 @@ pub(crate) fn next(m: &Material, headline: &Headline, parameters: &[ParameterRec
             larger_program(m),
         )),
         Verdict::MissingEffect(_) => {
-            if let Some(first) = d.candidates.first() {
+            let clear = if let NextStep::Add(clear) = d.next_step() { Some(clear) } else { None };
+            if let Some(first) = clear.or(d.candidates.first()) {
                 found(m, first, &plan_next, c, &mut out);
             }
         }

@@ -83,6 +83,48 @@ fn a_wobble_says_where_its_bearing_is() {
     assert!((arm.value + 180.0).abs() < 40.0, "{}", arm.value);
 }
 
+/// X of the paper's machine bears the table and pitches by 120 µrad at 150 mm, about the middle of its carriages 180 mm below the ball:
+/// at the ball it shows as 22 µm of another scale.
+#[test]
+fn a_pitching_carriage_says_where_it_turns() {
+    let bench = Bench::of("swivel-head", true);
+    let about = bench.machine.reference.ball - forward::V::z() * 180.0;
+    let pitch = move |at: &At, wrong: &mut forward::Wrong| {
+        wrong.after[0].push(forward::Slip::turn(forward::V::y() * (120e-6 * at.q[0] / 150.0), about));
+    };
+    let d = judge::diagnosis(&bench, &[&pitch], 5);
+    let first = &d.candidates[0];
+    assert_eq!(first.effect, "angular-bx", "{}", d.says);
+    let says = &first.says;
+    assert!(
+        says.contains("turn of the carriage of X about a point 1")
+            && says.contains(" mm below the ball: the guideway, not straightness or scale"),
+        "{says}"
+    );
+    let value = |name: &str| first.parameters.iter().find(|p| p.name == name).unwrap().value;
+    assert!((value("EBX_x") / value("EBX") * 1e3 - 180.0).abs() < 20.0, "{} {}", value("EBX_x"), value("EBX"));
+}
+
+/// One index position of `full` has another feed. A control that stores 5 ms late moves it as a whole: that is no bad reading.
+#[test]
+fn an_index_position_at_another_feed_tells_the_latency() {
+    for machine in ["swivel-head", "trunnion", "double-head"] {
+        let bench = Bench::of(machine, true);
+        let feeds = |at: fn(f64, f64) -> f64, from: f64| {
+            let touches = bench.runs.iter().flat_map(|(plan, _)| &plan.touches);
+            touches.filter_map(|t| t.feed_mm_min).fold(from, at)
+        };
+        assert!(feeds(f64::max, 0.0) > 1.5 * feeds(f64::min, f64::INFINITY), "{machine}");
+        let late = |at: &At, wrong: &mut forward::Wrong| wrong.late += 5e-3 * at.feed_mm_min / 60.0;
+        let d = judge::diagnosis(&bench, &[&late], 8);
+        assert!(d.verdict.is_missing_effect(), "{machine}: {}", d.says);
+        let first = &d.candidates[0];
+        assert_eq!(first.effect, "latency", "{machine}: {}", d.says);
+        let size = first.parameters[0].value;
+        assert!((size - 5.0).abs() < 1.0, "{machine}: {size} {}", first.parameters[0].unit);
+    }
+}
+
 /// The axis has another zero in the second of two runs, 0.03 degrees: the blocks of each run stand for themselves.
 #[test]
 fn an_axis_that_was_homed_again_is_named() {

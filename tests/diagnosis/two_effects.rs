@@ -1,6 +1,6 @@
 //! Two effects that act at once, where no single effect explains the touches. The case is a folder beside the project.
 
-use crate::common::verbs::{json, ok};
+use crate::common::verbs::{axiscal, json, ok};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -67,6 +67,34 @@ fn two_effects_that_explain_the_touches_together_are_named_together() {
     for part in ["scale-y", "backlash-a", "both", &format!("{before:.2}"), &format!("{after:.2} µm")] {
         assert!(says.contains(part), "{part:?} is not in {says:?}");
     }
+}
+
+/// `backlash-a` is clear; what `scale-y` may be is asked with it in the model, by `diagnose` and by `plan-next` alike.
+#[test]
+fn the_effect_that_is_clear_is_added_first_and_the_other_is_asked_with_it() {
+    let Some(folder) = case() else { return };
+    let at = folder.path();
+    measure(at);
+    let said = String::from_utf8(axiscal(at, &["diagnose", "study.toml"]).stdout).unwrap();
+    assert!(said.contains("next: axiscal add study.toml backlash-a"), "{said}");
+    let (d, _) = json(at, &["diagnose", "study.toml"]);
+    let first = &d["candidates"][0];
+    assert!(first["tell_apart"].as_str().unwrap().starts_with("add backlash-a first"), "{first}");
+    let next = |out: &str| json(at, &["plan-next", "study.toml", "--controller", "linuxcnc", "--out", out]).0;
+    let asked = next("first");
+    ok(at, &["add", "study.toml", "backlash-a"]);
+    let (d, _) = json(at, &["diagnose", "study.toml"]);
+    assert_eq!(d["candidates"][0]["effect"], "scale-y", "{}", d["says"]);
+    let then = next("then");
+    assert_eq!((&asked["pairs"], &asked["says"]), (&then["pairs"], &then["says"]));
+    // it asks for what `diagnose` names, and not for what backlash-a makes of other effects
+    let names = group(&d["candidates"][0]);
+    for pair in then["pairs"].as_array().unwrap() {
+        let is_named = |id: &Value| id.is_null() || names.contains(&id.as_str().unwrap());
+        assert!(is_named(&pair["one"]) && is_named(&pair["other"]), "{then}");
+    }
+    // the turns of which a scale is a special case are not passed over
+    assert!(then["says"].as_str().unwrap().contains("a special case of angular-cy, angular-ay"), "{}", then["says"]);
 }
 
 /// With both in the model their sizes are those that were planted, and nothing is missing.

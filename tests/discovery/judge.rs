@@ -286,19 +286,11 @@ pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
         let groups = groups(&d);
         let first = groups.first().filter(|_| d.verdict.is_missing_effect());
         let named = first.is_some_and(|g| g.iter().any(|id| expects.contains(&id.as_str())));
-        let gross = d.mistake().is_some_and(|says| expects.iter().any(|id| says.contains(id)));
-        // a finding about a size that no machine has: it names the effect or its parameters
+        let gross = d.mistake().is_some() && d.gross.first().is_some_and(|g| expects.contains(&g.hypothesis.as_str()));
+        // a size that no machine has, among the remarks that a user sees
+        let too_large = d.oversized.iter().take(3).any(|o| expects.contains(&o.effect.as_str()));
+        result.led |= named || gross || too_large;
         let cannot_be_tested = |id: &str| d.needs_temperature.iter().any(|e| e == id);
-        let told = |id: &str| {
-            let of = fit.model.unknowns.iter().filter(|u| u.effect == id).map(|u| u.own_name().to_owned());
-            let names: Vec<String> = of.chain([id.to_owned()]).collect();
-            d.warnings
-                .iter()
-                .chain(&fit.outcome.warnings)
-                .chain([&d.says])
-                .any(|w| names.iter().any(|n| w.contains(n.as_str())))
-        };
-        result.led |= named || gross || expects.iter().any(|id| !cannot_be_tested(id) && told(id));
         let asks_for_temperatures = expects.iter().any(|id| cannot_be_tested(id) && d.says.contains(id));
         let first_name = first.map(|g| g[0].clone());
         result.said.push(format!("{}: {}", d.verdict.as_str(), first_name.as_deref().unwrap_or("no effect")));

@@ -22,18 +22,24 @@ use serde_json::json;
 /// What is of second order is left out below: turns of 2e-5 squared times 200 mm are 8e-8.
 const BY_HAND_MM: f64 = 1e-7;
 
-/// A touch of a block of 10 mm with a ball of 3 mm, all rotary axes at 0 but C.
+/// A touch of a block of 10 mm with a ball of 3 mm.
 struct Touch {
     carrier: &'static str,
     /// Centre of the block in the carrier's frame.
     centre: [f64; 3],
     normal: [f64; 3],
     c_deg: f64,
+    /// B of the machine with a head, A of the trunnion.
+    tilt_deg: f64,
 }
 
 impl Touch {
     fn of_c(centre: [f64; 3], normal: [f64; 3], c_deg: f64) -> Self {
-        Self { carrier: "C", centre, normal, c_deg }
+        Self { carrier: "C", centre, normal, c_deg, tilt_deg: 0.0 }
+    }
+
+    fn tilted(self, tilt_deg: f64) -> Self {
+        Self { tilt_deg, ..self }
     }
 
     fn pose(&self, machine: &Machine) -> Position {
@@ -41,6 +47,8 @@ impl Touch {
         if machine.axis(AxisName::C).is_some() {
             pose.set(AxisName::C, self.c_deg);
         }
+        let tilting = [AxisName::A, AxisName::B].into_iter().find(|name| machine.axis(*name).is_some());
+        pose.set(tilting.unwrap(), self.tilt_deg);
         pose
     }
 }
@@ -88,7 +96,7 @@ fn check_last(machine: &Machine, touches: &[Touch], effect: &str, values: &[(&st
     let scenario = scenario::parse(&source("by-hand", &text), machine).unwrap().0;
     let (raw, _) = simulate::run(machine, &plan, &scenario, None).unwrap();
     let mut log: Vec<_> = raw.iter().map(matched).collect();
-    let outward = outward(last);
+    let outward = outward(machine, last);
     let off = log.last().unwrap().position.xyz_mm() - last.nominal_position().xyz_mm();
     let reading = off.dot(&outward);
     assert!(
@@ -117,11 +125,14 @@ fn check_last(machine: &Machine, touches: &[Touch], effect: &str, values: &[(&st
     assert!(gap.abs() < BY_HAND_MM, "model, {place}: {gap:e} mm");
 }
 
-/// The normal of the face in R: C turns it, right-handed about Z.
-fn outward(touch: &PlanTouch) -> nalgebra::Vector3<f64> {
+/// The normal of the face in R: C turns it, right-handed about Z, and A of a table about X.
+fn outward(machine: &Machine, touch: &PlanTouch) -> nalgebra::Vector3<f64> {
     let (s, c) = touch.pose.get(AxisName::C).unwrap_or(0.0).to_radians().sin_cos();
+    let a = machine.axis(AxisName::A).and_then(|_| touch.pose.get(AxisName::A)).unwrap_or(0.0);
+    let (sa, ca) = a.to_radians().sin_cos();
     let [x, y, z] = touch.normal;
-    nalgebra::Vector3::new(c * x - s * y, s * x + c * y, z)
+    let (x, y) = (c * x - s * y, s * x + c * y);
+    nalgebra::Vector3::new(x, ca * y - sa * z, sa * y + ca * z)
 }
 
 const X: [f64; 3] = [1.0, 0.0, 0.0];
@@ -140,7 +151,7 @@ fn table() -> Machine {
 /// What bears the blocks of each machine: C of the trunnion, the linear axes' table of the other.
 fn on(machine: &Machine, centre: [f64; 3], normal: [f64; 3]) -> Touch {
     let carrier = if machine.name == "trunnion" { "C" } else { "table" };
-    Touch { carrier, centre, normal, c_deg: 0.0 }
+    Touch { carrier, centre, normal, c_deg: 0.0, tilt_deg: 0.0 }
 }
 
 #[test]
@@ -237,6 +248,77 @@ fn the_new_rows_by_hand() {
     // back from 10 to 5 degrees: 5 degrees since the reversal, 1 - exp(-1/2) = 0.393 469 340; 20 µrad * 50 mm * that = 0.000 393 469
     let back = [0.0, 10.0, 5.0].map(|c| Touch::of_c([50.0, 0.0, -202.684], Y, c));
     check_last(&table, &back, "windup-c", &wound, "", 0.000_393_469);
+}
+
+/// The table turns by 10 µrad about X at C = 90, where the block has gone to Y = 30.
+#[test]
+fn a_wobble_acts_about_its_bearing() {
+    let table = table();
+    let touch = |normal| Touch::of_c([30.0, 0.0, -202.684], normal, 90.0);
+    // about a point at the ball's height: what is 30 mm out along +Y is lifted by 30 * 10e-6 = 0.0003, and goes nowhere else
+    let level = [("EAC1s", 10.0), ("arm_tilt_c_1", 0.0)];
+    check(&table, touch(Z), "tilt-c-1", &level, "", 0.0003);
+    check(&table, touch(X), "tilt-c-1", &level, "", 0.0);
+    // about a point 200 mm below it the block also goes 200 * 10e-6 = 0.002 to -Y; its face +X looks to +Y
+    let below = [("EAC1s", 10.0), ("arm_tilt_c_1", -200.0)];
+    check(&table, touch(X), "tilt-c-1", &below, "", -0.002);
+    check(&table, touch(Z), "tilt-c-1", &below, "", 0.0003);
+}
+
+/// The carriage of X pitches by 20 µrad at 300 mm, by 10 µrad about Y at X = 150.
+#[test]
+fn a_pitch_of_a_guideway_acts_on_what_its_carriage_bears() {
+    let (head, table) = (head(), table());
+    let top = |machine: &Machine| on(machine, [150.0, 0.0, -202.684], Z);
+    let side = |machine: &Machine| on(machine, [142.0, 0.0, -202.684], X);
+    // A table's carriage: about the ball's place at zero. The block is 150 mm from there to +X and sinks by 150 * 10e-6 = 0.0015. A
+    // head's carriage: about the origin of R that goes along with it, 202.684 mm above the ball: it goes sideways, which the top does
+    // not see.
+    let level = [("EBX", 20.0), ("EBX_x", 0.0), ("EBX_z", 0.0)];
+    check(&table, top(&table), "angular-bx", &level, "", -0.0015);
+    check(&head, top(&head), "angular-bx", &level, "", 0.0);
+    // about a point 180 mm below the ball: what is at the ball's height goes 180 * 10e-6 = 0.0018 to +X. The point is 180 mm below
+    // where the turn of the table is stated: EBX_x is 20e-6 * 180 mm = 3.6 µm at 300 mm. It is 382.684 mm below the origin of R:
+    // 20e-6 * 382.684 = 7.653 68 µm. The face +X of the table comes towards the ball; the head's ball is ahead of its coordinate.
+    check(&table, side(&table), "angular-bx", &[("EBX", 20.0), ("EBX_x", 3.6), ("EBX_z", 0.0)], "", 0.0018);
+    check(&head, side(&head), "angular-bx", &[("EBX", 20.0), ("EBX_x", 7.653_68), ("EBX_z", 0.0)], "", -0.0018);
+}
+
+/// 40 µrad of play: an axis that is clamped at +30 degrees has fallen 20 µrad further, at -30 degrees 20 µrad the other way.
+#[test]
+fn a_clamped_axis_falls_to_the_side_of_its_load() {
+    let (head, table) = (head(), table());
+    // A of the table passes through (0, 0, -250): the upper face 50 mm beside it goes 50 * 20e-6 = 0.001 along its normal
+    let block = || Touch::of_c([0.0, 50.0, -250.0], Z, 0.0);
+    check(&head, block().tilted(30.0), "clamp-play-a", &[("clamp_play_A", 40.0)], "", 0.001);
+    check(&head, block().tilted(-30.0), "clamp-play-a", &[("clamp_play_A", 40.0)], "", -0.001);
+    check(&head, block(), "clamp-play-a", &[("clamp_play_A", 40.0)], "", 0.0);
+    // B of the head at -30: the ball, at 202.684 * (sin 30, 0, -cos 30) from the pivot, turns by -20 µrad about Y, that is
+    // 202.684 * 20e-6 * (cos 30, 0, sin 30) = (0.003 510 590, 0, 0.002 026 840). It is that much ahead and meets each face so much later.
+    let of = |normal| on(&table, [0.0, 0.0, -202.684], normal).tilted(-30.0);
+    check(&table, of(X), "clamp-play-b", &[("clamp_play_B", 40.0)], "", -0.003_510_590);
+    check(&table, of(Z), "clamp-play-b", &[("clamp_play_B", 40.0)], "", -0.002_026_840);
+    check(&table, of(Y), "clamp-play-b", &[("clamp_play_B", 40.0)], "", 0.0);
+}
+
+/// A probe that triggers 4 µm later where it goes to its own -x.
+#[test]
+fn the_pretravel_of_a_direction_turns_with_the_probe() {
+    let table = table();
+    let of = |normal| on(&table, [0.0, 0.0, -202.684], normal);
+    let late = [("pretravel_xm", 4.0)];
+    // upright, the face +X is touched in -x; -X, Y and the top are not
+    check(&table, of(X), "pretravel-directions", &late, "", -0.004);
+    for other in [MINUS_X, Y, Z] {
+        check(&table, of(other), "pretravel-directions", &late, "", 0.0);
+    }
+    // at B = -90 the probe's x looks to +Z: the top is touched in its -x
+    check(&table, of(Z).tilted(-90.0), "pretravel-directions", &late, "", -0.004);
+    check(&table, of(X).tilted(-90.0), "pretravel-directions", &late, "", 0.0);
+    // the other three likewise
+    check(&table, of(MINUS_X), "pretravel-directions", &[("pretravel_xp", 4.0)], "", -0.004);
+    check(&table, of(Y), "pretravel-directions", &[("pretravel_ym", 4.0)], "", -0.004);
+    check(&table, of([0.0, -1.0, 0.0]), "pretravel-directions", &[("pretravel_yp", 4.0)], "", -0.004);
 }
 
 /// An axis loses its position by +10 µm, C by +40 µrad, 3.6 s after the first touch; the second comes after 10 s.

@@ -162,7 +162,7 @@ impl Open {
         let mut settings = loaded.quick_settings();
         settings.effects.retain(|e| !request.effects.contains(e));
         effects_of(request.effects, &loaded.catalogue, &loaded.machine)?;
-        let mut open = Self::look(loaded, settings)?;
+        let mut open = Self::look(loaded, settings)?.with_the_other_of_two(loaded, request)?;
         if let Some(mistake) = open.found.mistake() {
             let says = format!("a set-up mistake must be corrected first, and the touches measured again: {mistake}");
             return Ok(Err(NoProgram::new(says, &open.found.says)));
@@ -186,6 +186,16 @@ impl Open {
             open = open.with_groups_of_history(loaded, env)?;
         }
         Ok(Ok(open))
+    }
+
+    /// Of two effects that are named together the first one's group is judged with the other in the model: what the other does is no
+    /// difference between its members.
+    fn with_the_other_of_two(self, loaded: &Loaded, request: &Request) -> Result<Self> {
+        let first = self.found.candidates.first().filter(|first| first.proposed && request.effects.is_empty());
+        let Some(other) = first.and_then(|first| first.together_with.clone()) else { return Ok(self) };
+        let mut settings = self.settings;
+        settings.effects.push(other);
+        Self::look(loaded, settings)
     }
 
     /// What a step added may stand for others that the same touches could not tell from it: still open questions. Of each step its
@@ -270,7 +280,7 @@ impl Open {
             // as its tests allow for it
             setting.noise.tau_mm = found.open.tau_mm;
             let each = std::iter::once(&found.open).chain(&self.others);
-            let asked = each.map(|open| Questions::left_open(open.suspects.clone(), &open.pairs));
+            let asked = each.map(|open| Questions::left_open(open.suspects.clone(), &open.pairs, &open.including));
             return Ok(asked.reduce(Questions::and).unwrap_or_default());
         }
         let view = LinearisedPlan::new(&setting.task, &setting.runs, &setting.known, setting.noise)?;
