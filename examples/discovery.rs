@@ -144,6 +144,7 @@ fn report_faults(name: &str, outcomes: &[judge::Outcome]) {
     println!("  first three {}", of(&|o| o.rank.is_some()));
     println!("  by name     {}", of(&|o| o.by_name));
     println!("  proposed    {}", of(&|o| o.proposed));
+    println!("  two names for one fault {}", of(&|o| o.pair));
 }
 
 /// The parts that the generator of tests/discovery plants.

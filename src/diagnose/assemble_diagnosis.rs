@@ -60,7 +60,7 @@ pub(super) fn put_together(
         candidates.extend(seen.groups.iter().zip(tell_apart).enumerate().map(|(i, (group, told))| Candidate {
             tell_apart: told.says,
             never_parted: told.never,
-            ..candidate(fit, seen, (&first_order, &folds), group, (i == 0, decision.confirmed))
+            ..candidate(fit, seen, (&first_order, &folds), group, (i, decision.confirmed))
         }));
     }
     candidates.truncate(options.at_most);
@@ -411,25 +411,31 @@ fn candidate(
     seen: &Examination,
     (first_order, folds): (&FirstOrder, &Folds),
     group: &Group,
-    (first, borne_out): (bool, bool),
+    (place, borne_out): (usize, bool),
 ) -> Candidate {
+    let first = place == 0;
     let chosen = group.first();
     // sizes and what is left come from the order, probabilities from the tests
-    let score = &seen.order().scores[chosen];
+    let score = seen.score(chosen);
     let tests = || group.members.iter().map(|m| &seen.search.scores[m.candidate]);
     let p = tests().map(|s| s.p).fold(1.0, f64::min);
     // two effects that are named together pass their test together
-    let both = seen.both.filter(|_| first);
-    let p_adjusted = tests().map(|s| s.p_adjusted).chain(both.map(|b| b.p_adjusted)).fold(1.0, f64::min);
+    let both = seen.both.filter(|_| place < 2);
+    let of_both = both.filter(|_| first).map(|both| both.p_adjusted);
+    let p_adjusted = tests().map(|s| s.p_adjusted).chain(of_both).fold(1.0, f64::min);
     let effect = seen.named.effects[chosen];
-    let held = match seen.nested.as_ref().filter(|_| first && both.is_none()) {
-        Some(nested) => folds.chosen(seen.evidence, seen.named, nested),
-        None => folds.given(seen.evidence, seen.named, chosen),
+    let held = match (&both, seen.nested.as_ref().filter(|_| first)) {
+        (Some(both), _) => {
+            let variants = [both.first, both.second].map(|c| (c, seen.search.scores[c].variant));
+            folds.both(seen.evidence, seen.named, variants)
+        }
+        (None, Some(nested)) => folds.chosen(seen.evidence, seen.named, nested),
+        (None, None) => folds.given(seen.evidence, seen.named, chosen),
     };
     let errors = folds.errors(&held);
     let told = told(&score.covariance);
     // an order that leaves out the scatter of visits says nothing of the doubt: that is with it
-    let tested = &seen.search.scores[chosen];
+    let tested = both.map_or(&seen.search.scores[chosen], |_| score);
     let sigma = |i: usize| {
         let both = [Some(score), Some(tested).filter(|t| t.estimate.len() == score.estimate.len())];
         both.into_iter().flatten().map(|s| s.covariance[(i, i)].max(0.0).sqrt()).fold(0.0, f64::max)
@@ -493,7 +499,7 @@ fn candidate(
             .filter(|m| m.candidate != chosen)
             .map(|m| seen.named.effects[m.candidate].id.clone())
             .collect(),
-        together_with: both.and_then(|_| seen.first_names().get(1).map(|id| (*id).to_owned())),
+        together_with: both.and_then(|_| seen.first_names().get(1 - place).map(|id| (*id).to_owned())),
         or_else: None,
         tell_apart: String::new(),
         never_parted: false,

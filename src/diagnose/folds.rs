@@ -8,6 +8,7 @@ use super::candidate_effects::Named;
 use super::evidence::Evidence;
 use crate::fit::{Fit, held_out};
 use crate::search::held_out::{Choice, Colours, HeldOut, held_out_in};
+use crate::search::{Library, Origin, side_by_side};
 use crate::units::mm_from_um;
 use nalgebra::DMatrix;
 
@@ -64,6 +65,18 @@ impl Folds {
     /// With a candidate of the tests.
     pub(super) fn given(&self, evidence: &Evidence, named: &Named, candidate: usize) -> HeldOut {
         self.held_out(evidence, named, &[candidate], Choice::Given(0))
+    }
+
+    /// With two candidates of the tests at once, each with one of its variants.
+    pub(super) fn both(&self, evidence: &Evidence, named: &Named, two: [(usize, usize); 2]) -> HeldOut {
+        let columns = match &self.otherwise {
+            Some(own) => named.raw_um(&two).into_iter().map(|um| own.whiten(um.map(mm_from_um))).collect(),
+            None => two.map(|(candidate, variant)| named.library.columns(candidate, variant)).to_vec(),
+        };
+        let own = self.otherwise.as_ref().unwrap_or(evidence);
+        let mut library = Library::new(own.n_rows());
+        library.push("both", Origin::Catalogue, &side_by_side(&columns));
+        held_out_in(own.question(), &library, &own.visits, Choice::Given(0), &self.colours)
     }
 
     /// Of some candidates of the tests, in ascending order.

@@ -47,7 +47,7 @@ use crate::search::dependence::{Dependence, dependences};
 use crate::search::groups::{Group, Member};
 use crate::search::held_out::{Choice, HeldOut, held_out};
 use crate::search::pattern_tests::{Features, Generics};
-use crate::search::{LackOfFit, Pair, Search, lack_of_fit};
+use crate::search::{LackOfFit, Pair, Score, Search, lack_of_fit};
 use crate::units::um_from_mm;
 pub use answer::Diagnosis;
 use candidate_effects::Named;
@@ -113,6 +113,8 @@ pub(crate) struct Examination<'a> {
     pub given: bool,
     /// Two effects that are named together.
     pub both: Option<Pair>,
+    /// Their scores, each beside the other.
+    beside_each_other: Option<[Score; 2]>,
 }
 
 impl<'a> Examination<'a> {
@@ -121,9 +123,15 @@ impl<'a> Examination<'a> {
         self.ordered.as_ref().unwrap_or(&self.search)
     }
 
+    /// The score that a candidate's sizes are of.
+    fn score(&self, candidate: usize) -> &Score {
+        let of_the_pair = self.beside_each_other.iter().flatten().find(|score| score.candidate == candidate);
+        of_the_pair.unwrap_or(&self.order().scores[candidate])
+    }
+
     /// What the sizes of a candidate do before whitening, µm per typical size, with the shape that fits best.
     fn raw_um(&self, candidate: usize) -> DMatrix<f64> {
-        self.named.raw_um(&[(candidate, self.order().scores[candidate].variant)]).remove(0)
+        self.named.raw_um(&[(candidate, self.score(candidate).variant)]).remove(0)
     }
 
     /// Ids of the effect that is named first, or of the two that are named together.
@@ -160,6 +168,7 @@ fn examine<'a>(
         given: behind.is_some(),
         nested: behind.or(nested),
         both: None,
+        beside_each_other: None,
         evidence,
         named,
         search,
@@ -288,6 +297,7 @@ impl<'a> Tested<'a> {
         if let Some(pair) = pairs::both(subject, &seen, &decision) {
             pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most);
             seen.groups.iter_mut().for_each(|group| without_needless_incidents(group, named));
+            seen.beside_each_other = Some(seen.search.beside_each_other(&pair));
             (seen.both, seen.given) = (Some(pair), true);
             (beside.shapes_win, beside.better) = (false, None);
             decision = decide::Decision { kind: decide::Kind::MissingEffect, confirmed: true, named: true };
@@ -358,6 +368,9 @@ impl<'a> Tested<'a> {
             if first.proposed {
                 first.rms_after_um = again.outcome.rms_um;
                 first.remains = remains.or_else(|| Some(still_fails(&again, machine, catalogue)));
+                if let Some(second) = out.second_of_two_mut() {
+                    second.rms_after_um = again.outcome.rms_um;
+                }
             }
             assemble_diagnosis::outliers_again(&mut out, fit, &again);
         }

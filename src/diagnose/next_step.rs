@@ -62,18 +62,16 @@ impl Diagnosis {
             return NextStep::CorrectSetupMistake;
         }
         match &self.verdict {
-            Verdict::MissingEffect(_) => match self.candidates.first().filter(|c| c.proposed) {
-                None => NextStep::Nothing,
-                Some(first) if first.same_as.is_empty() => match &first.or_else {
+            Verdict::MissingEffect(_) => match self.proposed() {
+                [] => NextStep::Nothing,
+                [first, ..] if first.same_as.is_empty() => match &first.or_else {
                     None => NextStep::Add(first),
                     Some(other) => NextStep::AddOrCheck(first, other),
                 },
-                Some(first) => match self.named_with(first).filter(|second| second.same_as.is_empty()) {
-                    // it is clear already, and with it in the model the first one's group is judged again
-                    Some(second) => NextStep::Add(second),
-                    None if first.never_parted => NextStep::CheckWhich(first),
-                    None => NextStep::Separate(first),
-                },
+                // it is clear already, and with it in the model the first one's group is judged again
+                [_, second, ..] if second.same_as.is_empty() => NextStep::Add(second),
+                [first, ..] if first.never_parted => NextStep::CheckWhich(first),
+                [first, ..] => NextStep::Separate(first),
             },
             Verdict::Unexplained(found) => {
                 let formula = found.sketchable && self.verdict.moved_block().is_none();

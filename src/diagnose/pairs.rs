@@ -4,7 +4,7 @@ use super::decide::{Decision, Kind, LACK_OF_FIT, bears_out};
 use super::{Examination, Subject, tried_with};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, held_out};
-use crate::search::{KEPT, Library, Origin, Pair, Question, Search, lack_of_fit};
+use crate::search::{KEPT, Library, Origin, Pair, Question, Search, lack_of_fit, side_by_side};
 
 /// So many of the most significant groups are paired: effects that these touches cannot separate fill no list.
 const AMONG: usize = 10;
@@ -36,10 +36,7 @@ pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision) ->
         return None;
     }
     let mut library = Library::new(search.library.n_rows());
-    let columns = [pair.first, pair.second].map(|c| search.columns(c));
-    let width = columns[0].ncols() + columns[1].ncols();
-    let mut joint = columns[0].clone().resize_horizontally(width, 0.0);
-    joint.columns_mut(columns[0].ncols(), columns[1].ncols()).copy_from(&columns[1]);
+    let joint = side_by_side(&[pair.first, pair.second].map(|c| search.columns(c)));
     let mut base = search.question.base.clone();
     base.extend(&joint, KEPT);
     // with shapes at the values that were tried; where that leaves too much, with all of their values free

@@ -354,7 +354,7 @@ fn candidates(view: &View) -> Chart {
     c.legend = true;
     c.aspect = 0.45;
     let standings = [
-        ("proposed", Shape::Circle, true, [Standing::Proposed].as_slice()),
+        ("proposed", Shape::Circle, true, [Standing::Proposed, Standing::ProposedTogether].as_slice()),
         ("explains part", Shape::Circle, false, Standing::PARTS.as_slice()),
         ("no more than noise", Shape::Cross, false, [Standing::NoMoreThanNoise].as_slice()),
     ];

@@ -99,7 +99,7 @@ fn candidates(d: &Diagnosis, paper: Paper, verbose: bool) -> String {
     }
     let sized = || {
         let of = |c: &&Candidate| missing && c.p_adjusted < 1.0 && c.effect != setup_mistakes::EFFECT;
-        d.candidates.iter().filter(of).take(if verbose { usize::MAX } else { 1 })
+        d.candidates.iter().filter(of).take(if verbose { usize::MAX } else { d.proposed().len().max(1) })
     };
     if sized().any(|c| c.moves_sigma_um.is_some() || c.parameters.iter().any(|p| p.sigma.is_some())) {
         out += "expected size, ± one standard uncertainty:\n";
@@ -146,11 +146,12 @@ pub(super) fn probability(p: f64) -> String {
 
 /// A candidate in a cell: never one name where these touches cannot tell it from others.
 fn one_of(c: &Candidate) -> String {
+    let with = c.together_with.as_ref().map_or_else(String::new, |other| format!(", with {other}"));
     match c.same_as.len() {
-        0 if c.or_else.is_some() => format!("{} or something else", c.effect),
-        0 => c.effect.clone(),
-        1 => format!("{} or 1 other", c.effect),
-        n => format!("{} or {n} others", c.effect),
+        0 if c.or_else.is_some() => format!("{} or something else{with}", c.effect),
+        0 => format!("{}{with}", c.effect),
+        1 => format!("{} or 1 other{with}", c.effect),
+        n => format!("{} or {n} others{with}", c.effect),
     }
 }
 

@@ -24,6 +24,13 @@ fn clear_rounding(columns: &mut [f64], rows: usize) {
     }
 }
 
+/// The columns of several candidates in one matrix; all have as many rows.
+#[must_use]
+pub fn side_by_side(candidates: &[DMatrix<f64>]) -> DMatrix<f64> {
+    let columns: Vec<_> = candidates.iter().flat_map(DMatrix::column_iter).collect();
+    DMatrix::from_columns(&columns)
+}
+
 /// Where a candidate comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Origin {

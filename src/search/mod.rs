@@ -28,7 +28,7 @@ pub(crate) mod testing;
 mod tests;
 
 pub use basis::Basis;
-pub use library::{Candidate, Library, Origin, Variant, without_rounding};
+pub use library::{Candidate, Library, Origin, Variant, side_by_side, without_rounding};
 pub use moments::{Change, KEPT};
 pub use pairs::Pair;
 pub use scatter::{Scatter, Supposed, scatter_that_fits};

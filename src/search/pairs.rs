@@ -2,7 +2,8 @@
 
 use super::distributions::ln_p_of_f;
 use super::moments::Block;
-use super::score::{Search, held_against};
+use super::score::{Score, Search, held_against};
+use super::{KEPT, Library, Origin, Question};
 use nalgebra::{DMatrix, DVector};
 
 /// A candidate of a pair counts where adding it after the other one is no matter of chance by this measure.
@@ -66,6 +67,20 @@ impl Search<'_> {
             }
         }
         best
+    }
+
+    /// The scores of a pair with the sizes that each has when the other one is in the model.
+    #[must_use]
+    pub fn beside_each_other(&self, pair: &Pair) -> [Score; 2] {
+        [(pair.first, pair.second), (pair.second, pair.first)].map(|(candidate, other)| {
+            let mut base = self.question.base.clone();
+            base.extend(&self.columns(other), KEPT);
+            let mut library = Library::new(self.library.n_rows());
+            library.push("beside the other", Origin::Catalogue, &self.columns(candidate));
+            let mut beside = Search::new(Question { base: &base, ..self.question }, &library);
+            let Score { estimate, covariance, .. } = beside.scores.remove(0);
+            Score { estimate, covariance, ..self.scores[candidate].clone() }
+        })
     }
 
     fn alone(&self, candidate: usize, residual: &DVector<f64>) -> Alone {
@@ -173,6 +188,35 @@ mod tests {
             // only the candidates that are given are paired
             let without: Vec<usize> = all(&library).into_iter().filter(|&c| c != 3).collect();
             assert!(search.best_pair(&without).is_none_or(|pair| pair.second != 3 && pair.first != 3));
+        }
+    }
+
+    /// Two columns that have much in common: alone, each takes a part of the other for its own.
+    #[test]
+    fn each_of_a_pair_has_the_size_that_it_has_beside_the_other() {
+        let mut rng = rng(470);
+        let base = Basis::new(&noise_matrix(&mut rng, ROWS, 6));
+        let mut library = simple_effects(&mut rng);
+        let alike = column(&library, 3) + column(&library, 4);
+        library.push("alike", Origin::Catalogue, &DMatrix::from_columns(&[alike]));
+        let two = columns_of(&library, &[3, CANDIDATES]);
+        let residual = noise(&mut rng, ROWS) - &two * DVector::from_vec(vec![0.9, 0.6]);
+        let search = Search::new(ask(&residual, &base), &library);
+        let pair = search.best_pair(&[3, CANDIDATES]).unwrap();
+        let left = base.project_columns(&two);
+        let gram = left.tr_mul(&left).try_inverse().unwrap();
+        let sizes = -(&gram * left.tr_mul(&base.project(&residual)));
+        let rest = base.project(&residual) + &left * &sizes;
+        let covariance = gram * (rest.norm_squared() / (ROWS - 6 - 2) as f64);
+        for score in search.beside_each_other(&pair) {
+            let place = usize::from(score.candidate == CANDIDATES);
+            let own = (score.estimate[0], score.covariance[(0, 0)]);
+            assert!(
+                (own.0 - sizes[place]).abs() < 1e-9 && (own.1 / covariance[(place, place)] - 1.0).abs() < 1e-9,
+                "{own:?}"
+            );
+            let alone = search.scores[score.candidate].estimate[0];
+            assert!((alone - own.0).abs() > 3.0 * own.1.sqrt(), "{alone} {own:?}");
         }
     }
 

@@ -226,6 +226,8 @@ pub struct DiagnosisRecord {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Standing {
     Proposed,
+    /// Two effects are named together.
+    ProposedTogether,
     NoMoreThanNoise,
     /// There is too little data.
     CannotBeJudged,
@@ -245,6 +247,7 @@ impl Standing {
         let sizes = [candidate.held_out_before_um, candidate.held_out_after_um];
         let is_tried = sizes.iter().flatten().any(|um| *um > 0.0);
         match d.verdict {
+            _ if place < d.proposed().len() && candidate.together_with.is_some() => Self::ProposedTogether,
             _ if candidate.proposed => Self::Proposed,
             _ if candidate.p_adjusted >= FAMILY_LEVEL => Self::NoMoreThanNoise,
             Verdict::TooLittleData(_) => Self::CannotBeJudged,

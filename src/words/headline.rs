@@ -165,7 +165,11 @@ fn falls(m: &Material, c: &Candidate) -> String {
         false => (Vec::new(), most_moved_um(m)),
     };
     let sizes = if sizes.is_empty() { String::new() } else { format!(" Its size: {}.", sizes.join("; ")) };
-    let moves = moves.map_or_else(String::new, |most| format!(" It moves single touches by up to {}.", um(most)));
+    let (with, they_move) = match d.proposed() {
+        [_, _] => ("both", "Together they move"),
+        _ => ("this effect", "It moves"),
+    };
+    let moves = moves.map_or_else(String::new, |most| format!(" {they_move} single touches by up to {}.", um(most)));
     let rest = if c.remains == Some(true) { " Something else is missing as well." } else { "" };
     let (of, now_um, then_um) = match &d.all_touches {
         None => (String::new(), d.rms_um, m.proposed.map_or(c.rms_after_um, |fit| fit.outcome.rms_um)),
@@ -174,7 +178,7 @@ fn falls(m: &Material, c: &Candidate) -> String {
         }
     };
     format!(
-        "The residual{of} is {}, and {} with this effect in the model; the probe noise is {}.{sizes}{moves}{rest}",
+        "The residual{of} is {}, and {} with {with} in the model; the probe noise is {}.{sizes}{moves}{rest}",
         um(now_um),
         um(then_um),
         um(d.noise_um)
@@ -213,7 +217,10 @@ fn missing(m: &Material, c: &Candidate) -> String {
     };
     let or: String = others.iter().chain(&c.or_else).map(|other| format!(", or {other}")).collect();
     let which = if or.is_empty() { "" } else { ": these touches cannot separate them" };
-    let what = format!("{}{size}{or}{which}", c.name);
+    let what = match m.diagnosis.proposed() {
+        [_, second] => format!("{}{or}, and together with it {}: no single effect explains both", c.name, second.name),
+        _ => format!("{}{size}{or}{which}", c.name),
+    };
     let (whose, has) = whose(m, &c.effect);
     format!("{whose} {has} an error that is not in the model yet: {what}.")
 }

@@ -150,9 +150,13 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
         let act = if first.never_parted { Act::Nothing } else { Act::MeasureMore };
         out.push(Next::new("Find out which of them it is", capital(&first.tell_apart), command).with(act));
     }
+    let what = match &first.together_with {
+        Some(_) => format!("Add one of the two to the model: {}", first.name),
+        None => "Add it to the model".to_owned(),
+    };
     out.push(
         Next::new(
-            "Add it to the model",
+            what,
             "The error falls and the other values become right. This page then shows the next step.",
             format!("axiscal add {} {}", study(m), quoted(&first.effect)),
         )

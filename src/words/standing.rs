@@ -16,6 +16,7 @@ pub const fn judgement(judgement: Judgement) -> &'static str {
 pub const fn candidate(standing: Standing) -> &'static str {
     match standing {
         Standing::Proposed => "proposed",
+        Standing::ProposedTogether => "proposed together with another",
         Standing::NoMoreThanNoise => "no more than noise",
         Standing::CannotBeJudged => "cannot be judged yet",
         Standing::CannotBeTried => "possible: these poses cannot decide",

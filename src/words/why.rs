@@ -63,12 +63,17 @@ fn search(m: &Material) -> String {
                 first.join("; ")
             )
         }
-        (Verdict::MissingEffect(_) | Verdict::Unexplained(_), Some(c)) if c.p_adjusted < 0.05 => format!(
-            "Of {tested} known effects, {} explains most: {} remain with it. Probability by noise alone: {}.",
-            c.name,
-            um(c.rms_after_um),
-            by_noise(c)
-        ),
+        (Verdict::MissingEffect(_) | Verdict::Unexplained(_), Some(c)) if c.p_adjusted < 0.05 => {
+            let (who, with) = match d.proposed() {
+                [first, second] => (format!("{} and {} together explain", first.name, second.name), "both"),
+                _ => (format!("{} explains", c.name), "it"),
+            };
+            format!(
+                "Of {tested} known effects, {who} most: {} remain with {with}. Probability by noise alone: {}.",
+                um(c.rms_after_um),
+                by_noise(c)
+            )
+        }
         (Verdict::TooLittleData(_), _) => {
             format!("{tested} known effects were tested. These touches are too few to decide.")
         }
@@ -83,9 +88,10 @@ fn confirmed(m: &Material, parameters: &[ParameterRecord]) -> String {
     }
     match d.candidates.first().map(|c| (c.held_out_before_um, c.held_out_after_um)) {
         Some((Some(before), Some(after))) if before > 0.0 || after > 0.0 => format!(
-            "At index positions that were left out of the fit the error is {} without it and {} with it.",
+            "At index positions that were left out of the fit the error is {} without {it} and {} with {it}.",
             um(before),
-            um(after)
+            um(after),
+            it = if d.proposed().len() > 1 { "both" } else { "it" }
         ),
         _ => match d.held_out_rms_um {
             Some(error) => format!("At index positions that were left out of the fit the error is {}.", um(error)),

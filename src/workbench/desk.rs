@@ -157,12 +157,14 @@ impl Desk {
     /// The verdict in words and what to do next, as the report has them.
     #[must_use]
     pub fn verdict(&self, now: &Snapshot, shelf: &Shelf, found: &Diagnosis) -> (Headline, Vec<Next>) {
-        let proposed = found.candidates.first().filter(|c| c.proposed).and_then(|first| {
-            let mut settings = now.opened.quick_settings();
-            settings.effects.push(first.effect.clone());
-            // a candidate that cannot be fitted beside the others is still a candidate
-            shelf.fit(&now.opened, now.inputs, settings).ok()
-        });
+        let names = found.proposed().iter().map(|c| c.effect.clone());
+        let mut settings = now.opened.quick_settings();
+        settings.effects.extend(names);
+        // a candidate that cannot be fitted beside the others is still a candidate
+        let proposed = match found.proposed() {
+            [] => None,
+            _ => shelf.fit(&now.opened, now.inputs, settings).ok(),
+        };
         let proposed = proposed.as_ref().map(|(fit, _)| &**fit);
         verdict_of(&now.opened.loaded, &now.fit, proposed, found, &self.files)
     }

@@ -43,16 +43,17 @@ pub fn work_out(loaded: &Loaded, history: Option<&History>, env: &dyn Environmen
         history.map(|h| h.steps.iter().map(|s| s.effects.clone()).collect()).unwrap_or_default();
     let mut ladder = climb(&loaded.machine, &loaded.catalogue, &settings, &fit, &tried);
     let mut proposed = None;
-    if diagnosis.verdict.is_missing_effect()
-        && let Some(first) = diagnosis.candidates.first().filter(|c| c.proposed)
-    {
+    let names: Vec<&str> = diagnosis.proposed().iter().map(|c| c.effect.as_str()).collect();
+    if diagnosis.verdict.is_missing_effect() && !names.is_empty() {
         // a candidate that cannot be fitted beside the others is still a candidate
-        match with_effects(loaded.subject(&settings, &fit), &[first.effect.as_str()]) {
+        match with_effects(loaded.subject(&settings, &fit), &names) {
             Ok(with) => {
                 ladder.push(Rung::from_fit(&with, Kind::Proposed));
                 proposed = Some(with);
             }
-            Err(failure) => ladder.notes.push(format!("{} cannot be added to the model: {failure}", first.effect)),
+            Err(failure) => {
+                ladder.notes.push(format!("{} cannot be added to the model: {failure}", names.join(" and ")))
+            }
         }
     }
     let (correction, date) = possible_correction(loaded, &fit, env);

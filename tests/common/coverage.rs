@@ -199,7 +199,7 @@ pub fn scatters() -> Vec<Case> {
         ("trunnion", &["basic"], &["location-a", "location-c", "block-setup", "pretravel"]),
         ("trunnion", &["full"], &["location-a", "location-c", "block-setup", "pretravel"]),
     ] {
-        for declared_mm in [0.3e-3, 1e-3] {
+        for declared_mm in [0.3e-3, 0.55e-3, 1e-3] {
             for tau_mm in [0.0, 0.3e-3, 0.7e-3] {
                 let (artefact, planted, stated_tau_mm) = (None, &[][..], None);
                 let declared_tau_mm = Some(declared_mm);

@@ -173,6 +173,8 @@ fn hidden_faults_are_in_the_first_groups() {
         );
     }
     println!("first group {}, first three {}", rate(first, outcomes.len()), rate(three, outcomes.len()));
+    // one fault was planted in each
+    assert!(outcomes.iter().all(|o| !o.pair));
     // the draws are fixed, and today all 24 are in the first group: at most one may move to the second or third group
     assert!(first + 1 >= outcomes.len() && three == outcomes.len(), "{first} and {three} of {}", outcomes.len());
 }

@@ -62,10 +62,36 @@ fn two_effects_that_explain_the_touches_together_are_named_together() {
     assert!(before > 1.5 * noise, "{before} {noise}");
     assert!(after > 0.4 && after < 0.5f64.hypot(0.2) * 1.1 && after < noise, "{after}, noise {noise}");
     assert_eq!(first["remains"], false, "{first}");
+    // each has the size and the cross-validated error that it has beside the other
+    for (candidate, name, planted) in [(first, "EYY", 60.0), (second, "backlash_A", 80.0)] {
+        let size = &candidate["parameters"][0];
+        assert_eq!(size["name"], name, "{candidate}");
+        let off = number(size, "value") - planted;
+        assert!(off.abs() < 3.0 * number(size, "sigma") && off.abs() < 0.05 * planted, "{size}");
+        assert!(number(candidate, "held_out_after_um") < 0.7, "{candidate}");
+        assert_eq!(candidate["rms_after_um"], first["rms_after_um"]);
+    }
+    assert_eq!(second["together_with"], first["effect"]);
     // and the message states both names and the error that is left
     let says = d["says"].as_str().unwrap();
     for part in ["scale-y", "backlash-a", "both", &format!("{before:.2}"), &format!("{after:.2} µm")] {
         assert!(says.contains(part), "{part:?} is not in {says:?}");
+    }
+}
+
+/// The page says the same as the terminal: two names, the error with both, and the values of a model with both.
+#[test]
+fn the_report_names_both() {
+    let Some(folder) = case() else { return };
+    let at = folder.path();
+    measure(at);
+    let said = ok(at, &["report", "study.toml", "--out", "report.html"]);
+    let names =
+        "Scale of axis Y, or one of 3 others, and together with it Backlash of A: no single effect explains both";
+    assert!(said.contains(names), "{said}");
+    let page = std::fs::read_to_string(at.join("report.html")).unwrap();
+    for part in [names, "with both in the model", "after, with", "scale-y, backlash-a", "the backlash of A"] {
+        assert!(page.contains(part), "{part:?}");
     }
 }
 

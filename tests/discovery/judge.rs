@@ -38,9 +38,12 @@ pub struct Outcome {
     pub groups: Vec<Vec<String>>,
     /// Over the noise, with the first right or first named effect in the model.
     pub proposed: bool,
+    /// Two effects are named together, where one fault was planted.
+    pub pair: bool,
 }
 
-pub const LEAN: Options = Options { at_most: 3, refit: false, power: false, planned: None };
+/// As `diagnose` asks, refits included, without what is only said beside the answer.
+pub const AS_ASKED: Options = Options { at_most: 3, refit: true, power: false, planned: None };
 
 pub fn fit(bench: &Bench, touches: &[Vec<Touch>], more: &[String]) -> (Fit, Settings) {
     let runs: Vec<Run> = bench
@@ -66,7 +69,7 @@ pub fn diagnosis(bench: &Bench, acts: &[&Act], seed: u64) -> Diagnosis {
 
 pub fn ask(bench: &Bench, fit: &Fit, settings: &Settings) -> Diagnosis {
     let catalogue = Catalogue::built_in().unwrap();
-    diagnose(Subject { machine: &bench.machine, catalogue: &catalogue, settings, fit }, &LEAN).unwrap()
+    diagnose(Subject { machine: &bench.machine, catalogue: &catalogue, settings, fit }, &AS_ASKED).unwrap()
 }
 
 pub fn groups(d: &Diagnosis) -> Vec<Vec<String>> {
@@ -231,6 +234,7 @@ fn one(
         rank: groups.iter().position(|g| g.iter().any(right)).map(|i| i + 1),
         by_name: groups.first().is_some_and(|g| right(&g[0])),
         proposed: d.candidates.first().is_some_and(|c| c.proposed),
+        pair: d.candidates.first().is_some_and(|c| c.together_with.is_some()),
         groups,
     }
 }

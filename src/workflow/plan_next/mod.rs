@@ -191,10 +191,12 @@ impl Open {
     /// Of two effects that are named together the first one's group is judged with the other in the model: what the other does is no
     /// difference between its members.
     fn with_the_other_of_two(self, loaded: &Loaded, request: &Request) -> Result<Self> {
-        let first = self.found.candidates.first().filter(|first| first.proposed && request.effects.is_empty());
-        let Some(other) = first.and_then(|first| first.together_with.clone()) else { return Ok(self) };
+        let [_, second] = self.found.proposed() else { return Ok(self) };
+        if !request.effects.is_empty() {
+            return Ok(self);
+        }
         let mut settings = self.settings;
-        settings.effects.push(other);
+        settings.effects.push(second.effect.clone());
         Self::look(loaded, settings)
     }
 
@@ -228,7 +230,7 @@ impl Open {
 
     fn look(loaded: &Loaded, settings: Settings) -> Result<Self> {
         let fit = loaded.fit(&settings)?;
-        let options = Options { power: false, refit: false, ..Options::default() };
+        let options = Options { power: false, ..Options::default() };
         let found = loaded.diagnose(&settings, &fit, &options)?;
         Ok(Self { settings, fit, found, others: Vec::new() })
     }
