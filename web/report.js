@@ -228,7 +228,7 @@
         const p = c.p_adjusted < 1e-4 ? 'less than 1 in 10 000' : c.p_adjusted > 0.5 ? 'as good as certain' : `1 in ${Math.round(1 / c.p_adjusted)}`;
         const fact = (name, value) => [make('dt', {}, name), make('dd', {}, value)];
         const mends = d.effects[c.effect]?.mends;
-        cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(c.proposed || c.together_with ? 'span.badge.act' : 'span.badge', {}, d.standings_say[k])),
+        cards.append(make('div.card', {}, make('h3', {}, `${k + 1}. ${c.name} `, make(c.proposed ? 'span.badge.act' : 'span.badge', {}, d.standings_say[k])),
           make('dl.facts', {}, ...fact('id', c.effect), ...(c.together_with ? fact('together with', d.effects[c.together_with]?.name ?? c.together_with) : []), ...fact('remaining error', `${digits(c.rms_after_um)} µm${c.together_with ? ' with both' : ''} (now ${digits(d.rms_um)} µm)`),
             ...fact('cross-validated error', tried ? `${digits(c.held_out_after_um)} µm (now ${digits(c.held_out_before_um)} µm${c.held_out_se_um ? `; the difference is known to ± ${digits(c.held_out_se_um, 2)} µm` : ''})` : 'cannot be tried with these poses'),
             ...fact('probability by noise alone', `${p} (${least}, all ${d.tested} effects counted in)`),

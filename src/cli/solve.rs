@@ -300,6 +300,9 @@ fn propose(first: &Candidate, io: &Io) {
     if !first.wrong_sign.is_empty() {
         io.say(format!("  {}", wrong_sign(first)));
     }
+    if let Some(other) = &first.together_with {
+        io.say(format!("  named together with {other}, which is judged again when this effect is in the model"));
+    }
     io.say(format!("  {}", first.says));
     io.say(format!("  check at the machine: {}", first.look));
     if let (Some(before), Some(after)) = (first.held_out_before_um, first.held_out_after_um) {
@@ -307,9 +310,10 @@ fn propose(first: &Candidate, io: &Io) {
         let how = if first.nested { "choice repeated for each" } else { "effect given" };
         let fall = digits(before - after, first.held_out_se_um);
         io.say(format!(
-            "  cross-validated error ({how}): {} µm before, {} µm with it: {fall}{se} µm less",
+            "  cross-validated error ({how}): {} µm before, {} µm with {}: {fall}{se} µm less",
             significant(before),
-            significant(after)
+            significant(after),
+            if first.together_with.is_some() { "both" } else { "it" }
         ));
     }
     if !first.same_as.is_empty() {

@@ -82,8 +82,8 @@ impl Questions {
             let says = match including {
                 [] => format!("the data name {leader} alone: further touches confirm it"),
                 _ => format!(
-                    "{leader} explains what the model leaves over; it is a special case of {}, so that it may be a part of one of \
-                     them: further touches confirm it",
+                    "{leader} explains the remaining error. It is a special case of {}, which no touches can exclude. Further touches \
+                     confirm {leader}",
                     including.join(", ")
                 ),
             };
@@ -95,7 +95,7 @@ impl Questions {
             0 => String::new(),
             more => format!(" (and {more} more)"),
         };
-        let says = format!("{leader} explains what the model leaves over; it may as well be {named}{more}");
+        let says = format!("{leader} explains the remaining error; it may as well be {named}{more}");
         Self { pairs: asked, suspects, says }
     }
 

@@ -94,19 +94,7 @@ impl Diagnosis {
     /// What is proposed: one effect, or two that are named together.
     #[must_use]
     pub fn proposed(&self) -> &[Candidate] {
-        match self.candidates.as_slice() {
-            [first, second, ..] if first.proposed && first.together_with.as_ref() == Some(&second.effect) => {
-                &self.candidates[..2]
-            }
-            [first, ..] if first.proposed => &self.candidates[..1],
-            _ => &[],
-        }
-    }
-
-    /// Of two effects that are named together the one that stands second.
-    pub(super) fn second_of_two_mut(&mut self) -> Option<&mut Candidate> {
-        let place = self.proposed().len().checked_sub(1).filter(|place| *place > 0)?;
-        self.candidates.get_mut(place)
+        &self.candidates[..self.candidates.iter().take_while(|c| c.proposed).count()]
     }
 
     /// The effect that passes the test with all candidates counted in and that unused measurements do not confirm.

@@ -15,7 +15,7 @@ use crate::search::dependence::Dependence;
 use crate::search::groups::Group;
 use crate::search::multiplicity::FAMILY_LEVEL;
 use crate::search::pattern_tests::{Direction, Features, Kind};
-use crate::search::{Score, power};
+use crate::search::{Score, power, side_by_side};
 use crate::units::{mm_from_um, um_from_mm};
 use crate::words::diagnose as words;
 use nalgebra::DMatrix;
@@ -63,7 +63,7 @@ pub(super) fn put_together(
             ..candidate(fit, seen, (&first_order, &folds), group, (i, decision.confirmed))
         }));
     }
-    candidates.truncate(options.at_most);
+    candidates.truncate(options.at_most.max(seen.first_names().len()));
     super::turning_points::say(subject, &mut candidates);
     let found: Vec<&Group> = seen
         .groups
@@ -153,7 +153,9 @@ pub(super) fn put_together(
     // as the splits of `compare` and the sentences count: of what the noise does not explain
     let gross_first = usize::from(candidates.first().is_some_and(|c| c.effect == setup_mistakes::EFFECT));
     for (c, group) in candidates.iter_mut().skip(gross_first).zip(&seen.groups) {
-        c.share = beyond_the_noise(seen.evidence, c.share, seen.order().scores[group.first()].n_parameters);
+        let both = seen.both.filter(|_| c.together_with.is_some()).map(|both| both.n_parameters);
+        let n_parameters = both.unwrap_or(seen.order().scores[group.first()].n_parameters);
+        c.share = beyond_the_noise(seen.evidence, c.share, n_parameters);
     }
     // the curve is of what is named first
     let drawn = significant().find(|d| depends.first().is_some_and(|w| w.by == by(&d.on)));
@@ -281,11 +283,15 @@ fn without_temperature(fit: &Fit, seen: &Examination) -> Vec<String> {
 
 /// What goes with time may go with the temperature of the room, which a log without temperatures does not show.
 fn room_or_time(fit: &Fit, seen: &Examination, candidates: &mut [Candidate]) {
-    let Some((first, group)) = candidates.first_mut().filter(|c| c.proposed).zip(seen.groups.first()) else { return };
-    let effect = seen.named.effects[group.first()];
-    let with_time = effect.terms.iter().any(|t| t.formula.variables().contains(&"t"));
-    if effect.id == first.effect && with_time && !effect.is_incident() && !without_temperature(fit, seen).is_empty() {
-        first.or_else = Some("what goes with the room's temperature (this log carries none)".to_owned());
+    if without_temperature(fit, seen).is_empty() {
+        return;
+    }
+    for (candidate, group) in candidates.iter_mut().filter(|c| c.proposed).zip(&seen.groups) {
+        let effect = seen.named.effects[group.first()];
+        let with_time = effect.terms.iter().any(|t| t.formula.variables().contains(&"t"));
+        if effect.id == candidate.effect && with_time && !effect.is_incident() {
+            candidate.or_else = Some("what goes with the room's temperature (this log carries none)".to_owned());
+        }
     }
 }
 
@@ -416,26 +422,32 @@ fn candidate(
     let first = place == 0;
     let chosen = group.first();
     // sizes and what is left come from the order, probabilities from the tests
-    let score = seen.score(chosen);
-    let tests = || group.members.iter().map(|m| &seen.search.scores[m.candidate]);
+    let score = &seen.scores(place)[chosen];
+    let both = seen.both.filter(|_| place < 2);
+    let tested_in = if both.is_some() { seen.scores(place) } else { &seen.search.scores };
+    let tests = || group.members.iter().map(|m| &tested_in[m.candidate]);
     let p = tests().map(|s| s.p).fold(1.0, f64::min);
     // two effects that are named together pass their test together
-    let both = seen.both.filter(|_| place < 2);
-    let of_both = both.filter(|_| first).map(|both| both.p_adjusted);
-    let p_adjusted = tests().map(|s| s.p_adjusted).chain(of_both).fold(1.0, f64::min);
+    let p_adjusted = match both {
+        Some(both) => both.p_adjusted,
+        None => tests().map(|s| s.p_adjusted).fold(1.0, f64::min),
+    };
     let effect = seen.named.effects[chosen];
-    let held = match (&both, seen.nested.as_ref().filter(|_| first)) {
-        (Some(both), _) => {
-            let variants = [both.first, both.second].map(|c| (c, seen.search.scores[c].variant));
-            folds.both(seen.evidence, seen.named, variants)
+    let held = match (seen.nested.as_ref().filter(|_| first), both) {
+        (_, Some(_)) => {
+            let of = |place: usize| {
+                let candidate = seen.groups[place].first();
+                (candidate, seen.scores(place)[candidate].variant)
+            };
+            folds.both(seen.evidence, seen.named, [of(0), of(1)])
         }
-        (None, Some(nested)) => folds.chosen(seen.evidence, seen.named, nested),
+        (Some(nested), None) => folds.chosen(seen.evidence, seen.named, nested),
         (None, None) => folds.given(seen.evidence, seen.named, chosen),
     };
     let errors = folds.errors(&held);
     let told = told(&score.covariance);
     // an order that leaves out the scatter of visits says nothing of the doubt: that is with it
-    let tested = both.map_or(&seen.search.scores[chosen], |_| score);
+    let tested = &tested_in[chosen];
     let sigma = |i: usize| {
         let both = [Some(score), Some(tested).filter(|t| t.estimate.len() == score.estimate.len())];
         both.into_iter().flatten().map(|s| s.covariance[(i, i)].max(0.0).sqrt()).fold(0.0, f64::max)
@@ -472,18 +484,24 @@ fn candidate(
             sigma: None,
         });
     }
-    let raw_um = seen.raw_um(chosen);
+    let raw_um = seen.raw_um(place, chosen);
     let moves = moves(seen, score, &raw_um);
+    // of two that are named together the error that is left, and what becomes less certain, are those with both
+    let with_both = both.and_then(|_| {
+        let other = seen.groups.get(1 - place)?.first();
+        Some(side_by_side(&[raw_um.clone(), seen.raw_um(1 - place, other)]))
+    });
     let question = seen.order().question;
     let total = question.base.project(question.residual).norm_squared().max(f64::MIN_POSITIVE);
-    let raw_mm = raw_um.map(mm_from_um);
+    let raw_mm = with_both.as_ref().unwrap_or(&raw_um).map(mm_from_um);
+    let taken = both.map_or(score.delta_ss, |both| both.delta_ss);
     Candidate {
         effect: effect.id.clone(),
         name: effect.name.clone(),
         // the group is one finding: its figures are those of its most significant member
         p,
         p_adjusted,
-        proposed: first && borne_out && p_adjusted < FAMILY_LEVEL,
+        proposed: (first || both.is_some()) && borne_out && p_adjusted < FAMILY_LEVEL,
         rms_after_um: first_order.rms_um(&raw_mm),
         held_out_before_um: errors.before_um,
         held_out_after_um: errors.after_um,
@@ -505,7 +523,7 @@ fn candidate(
         never_parted: false,
         says,
         look: effect.look.clone(),
-        share: score.delta_ss / total,
+        share: taken / total,
         times_usual: score.relative_size(),
         plausible: score.relative_size() <= crate::search::groups::PLAUSIBLE,
         wrong_sign: {

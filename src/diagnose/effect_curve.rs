@@ -20,7 +20,7 @@ const ALONG: [&str; 3] = ["X", "Y", "Z"];
 pub(super) fn curve(seen: &Examination, features: &Features, on: &str, by: &str) -> Option<Shape> {
     let chosen = seen.groups.first()?.first();
     let effect = seen.named.effects[chosen];
-    let score = &seen.order().scores[chosen];
+    let score = &seen.scores(0)[chosen];
     let slot = VARIABLES.iter().position(|v| *v == on)?;
     let variable = features.variables.iter().find(|v| v.name == on)?;
     let scanned = seen.named.scanned[chosen].as_ref().map(|s| s.name.as_str());

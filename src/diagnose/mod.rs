@@ -113,8 +113,8 @@ pub(crate) struct Examination<'a> {
     pub given: bool,
     /// Two effects that are named together.
     pub both: Option<Pair>,
-    /// Their scores, each beside the other.
-    beside_each_other: Option<[Score; 2]>,
+    /// All scores with the second of them in the model, and with the first.
+    beside: Option<[Vec<Score>; 2]>,
 }
 
 impl<'a> Examination<'a> {
@@ -123,15 +123,16 @@ impl<'a> Examination<'a> {
         self.ordered.as_ref().unwrap_or(&self.search)
     }
 
-    /// The score that a candidate's sizes are of.
-    fn score(&self, candidate: usize) -> &Score {
-        let of_the_pair = self.beside_each_other.iter().flatten().find(|score| score.candidate == candidate);
-        of_the_pair.unwrap_or(&self.order().scores[candidate])
+    /// The scores that sizes of a group's members are of, by the place of the group: of two effects that are named together each is
+    /// judged with the other in the model.
+    fn scores(&self, place: usize) -> &[Score] {
+        let beside = self.beside.as_ref().and_then(|both| both.get(place));
+        beside.unwrap_or(&self.order().scores)
     }
 
-    /// What the sizes of a candidate do before whitening, µm per typical size, with the shape that fits best.
-    fn raw_um(&self, candidate: usize) -> DMatrix<f64> {
-        self.named.raw_um(&[(candidate, self.score(candidate).variant)]).remove(0)
+    /// What the sizes of a group's member do before whitening, µm per typical size, with the shape that fits best.
+    fn raw_um(&self, place: usize, candidate: usize) -> DMatrix<f64> {
+        self.named.raw_um(&[(candidate, self.scores(place)[candidate].variant)]).remove(0)
     }
 
     /// Ids of the effect that is named first, or of the two that are named together.
@@ -168,7 +169,7 @@ fn examine<'a>(
         given: behind.is_some(),
         nested: behind.or(nested),
         both: None,
-        beside_each_other: None,
+        beside: None,
         evidence,
         named,
         search,
@@ -294,21 +295,28 @@ impl<'a> Tested<'a> {
             scatter: scatter(fit, machine, evidence),
         };
         let mut decision = decide::decide(&seen, &beside);
+        let may_refit = options.refit && fit.outcome.rms_um <= setup_mistakes::GROSS_UM;
+        let mut refitted = None;
         if let Some(pair) = pairs::both(subject, &seen, &decision) {
-            pairs::in_front(&mut seen.groups, &seen.search, &pair, options.at_most);
-            seen.groups.iter_mut().for_each(|group| without_needless_incidents(group, named));
-            seen.beside_each_other = Some(seen.search.beside_each_other(&pair));
-            (seen.both, seen.given) = (Some(pair), true);
-            (beside.shapes_win, beside.better) = (false, None);
-            decision = decide::Decision { kind: decide::Kind::MissingEffect, confirmed: true, named: true };
+            let (groups, scores) = pairs::in_front(&seen, &pair, options.at_most);
+            let names = groups[..2].iter().map(|group| &*named.effects[group.first()].id).collect::<Vec<_>>();
+            let again = if may_refit { Some(tried_with(subject, &names)?) } else { None };
+            // names with which the error grows are none
+            if !again.as_ref().is_some_and(|again| raises_the_error(fit, again)) {
+                (seen.groups, seen.beside) = (groups, Some(scores));
+                seen.groups.iter_mut().for_each(|group| without_needless_incidents(group, named));
+                (seen.both, seen.given) = (Some(pair), true);
+                (beside.shapes_win, beside.better) = (false, None);
+                decision = decide::Decision { kind: decide::Kind::MissingEffect, confirmed: true, named: true };
+                refitted = again;
+            }
         }
-        let refitted = match options.refit && decision.confirmed && fit.outcome.rms_um <= setup_mistakes::GROSS_UM {
-            true => Some(tried_with(subject, &seen.first_names())?),
-            false => None,
-        };
-        if refitted.as_ref().is_some_and(|again| raises_the_error(fit, again)) {
-            // a name with which the error grows is none
-            (decision.kind, decision.confirmed) = (decide::Kind::Unexplained, false);
+        if seen.both.is_none() && may_refit && decision.confirmed {
+            let again = tried_with(subject, &seen.first_names())?;
+            if raises_the_error(fit, &again) {
+                (decision.kind, decision.confirmed) = (decide::Kind::Unexplained, false);
+            }
+            refitted = Some(again);
         }
         Ok(Self { subject, features, options, generics, seen, beside, decision, refitted })
     }
@@ -366,11 +374,8 @@ impl<'a> Tested<'a> {
                 _ => tried_with(subject, &[first.effect.as_str()])?,
             };
             if first.proposed {
-                first.rms_after_um = again.outcome.rms_um;
                 first.remains = remains.or_else(|| Some(still_fails(&again, machine, catalogue)));
-                if let Some(second) = out.second_of_two_mut() {
-                    second.rms_after_um = again.outcome.rms_um;
-                }
+                out.candidates.iter_mut().filter(|c| c.proposed).for_each(|c| c.rms_after_um = again.outcome.rms_um);
             }
             assemble_diagnosis::outliers_again(&mut out, fit, &again);
         }

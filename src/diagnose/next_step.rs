@@ -68,7 +68,7 @@ impl Diagnosis {
                     None => NextStep::Add(first),
                     Some(other) => NextStep::AddOrCheck(first, other),
                 },
-                // it is clear already, and with it in the model the first one's group is judged again
+                // of two the one that is clear goes into the model, and the other one is judged again
                 [_, second, ..] if second.same_as.is_empty() => NextStep::Add(second),
                 [first, ..] if first.never_parted => NextStep::CheckWhich(first),
                 [first, ..] => NextStep::Separate(first),

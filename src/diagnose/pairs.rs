@@ -4,7 +4,7 @@ use super::decide::{Decision, Kind, LACK_OF_FIT, bears_out};
 use super::{Examination, Subject, tried_with};
 use crate::search::groups::Group;
 use crate::search::held_out::{Choice, held_out};
-use crate::search::{KEPT, Library, Origin, Pair, Question, Search, lack_of_fit, side_by_side};
+use crate::search::{KEPT, Library, Origin, Pair, Question, Score, Search, lack_of_fit, side_by_side};
 
 /// So many of the most significant groups are paired: effects that these touches cannot separate fill no list.
 const AMONG: usize = 10;
@@ -64,16 +64,27 @@ fn is_left_to_the_noise(subject: Subject, effects: [&str; 2]) -> bool {
     tried_with(subject, &effects).is_ok_and(|fit| fit.dof > 0 && fit.outcome.chi2_per_dof <= fit.noise.limit(fit.dof))
 }
 
-/// The groups with those of the pair in front.
-pub(super) fn in_front(groups: &mut Vec<Group>, seen: &crate::search::Search, pair: &Pair, at_most: usize) {
-    let ranking = seen.ranking();
-    let first = seen.group_of(pair.first, &ranking);
-    let rest: Vec<usize> = ranking.iter().copied().filter(|c| !first.holds(*c)).collect();
-    let second = seen.group_of(pair.second, &rest);
-    groups.retain(|g| ![g.first(), g.leader].iter().any(|c| first.holds(*c) || second.holds(*c)));
-    groups.insert(0, second);
-    groups.insert(0, first);
-    groups.truncate(at_most);
+/// The groups with those of the pair in front, and the scores of each with the other in the model: what the other one does says nothing
+/// of what is in its group.
+pub(super) fn in_front(seen: &Examination, pair: &Pair, at_most: usize) -> (Vec<Group>, [Vec<Score>; 2]) {
+    groups_with_the_pair(&seen.search, &seen.groups, pair, at_most)
+}
+
+fn groups_with_the_pair(
+    search: &Search,
+    groups: &[Group],
+    pair: &Pair,
+    at_most: usize,
+) -> (Vec<Group>, [Vec<Score>; 2]) {
+    let (of_first, first) = search.beside(pair.second, pair.first);
+    let (of_second, mut second) = search.beside(pair.first, pair.second);
+    second.members.retain(|m| m.candidate == pair.second || !first.holds(m.candidate));
+    let is_one_of_them = |g: &Group| [g.first(), g.leader].iter().any(|c| first.holds(*c) || second.holds(*c));
+    let rest: Vec<Group> = groups.iter().filter(|g| !is_one_of_them(g)).cloned().collect();
+    let mut all = vec![first, second];
+    all.extend(rest);
+    all.truncate(at_most.max(2));
+    (all, [of_first, of_second])
 }
 
 #[cfg(test)]
@@ -102,9 +113,10 @@ mod tests {
         let search = Search::new(Question { residual: &residual, base: &base, pure: None }, &library);
         let pair = search.best_pair(&[1, 2]).unwrap();
         let twin_of = |candidate: usize| candidate + 5;
-        let mut groups = search.groups(8);
+        let groups = search.groups(8);
         assert_eq!(groups[0].first(), 0);
-        in_front(&mut groups, &search, &pair, 4);
+        let (groups, scores) = groups_with_the_pair(&search, &groups, &pair, 4);
+        assert!(scores.iter().all(|scores| scores.len() == library.candidates().len()));
         assert_eq!(groups.len(), 4);
         assert!(groups[0].holds(pair.first) && groups[0].holds(twin_of(pair.first)), "{pair:?} {:?}", groups[0]);
         assert!(groups[1].holds(pair.second) && groups[1].holds(twin_of(pair.second)), "{pair:?} {:?}", groups[1]);

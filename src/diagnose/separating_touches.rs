@@ -1,11 +1,12 @@
 //! Which touches would tell the members of a group apart: variations of these very touches that this machine can make.
 
-use super::{Examination, Options, Subject};
+use super::{Examination, Options, Subject, settings_with};
 use crate::design::{Known, LinearisedPlan, Noise, Planned, Task, keep_measured, variations};
 use crate::diag::Result;
 use crate::fit::{Knowledge, effects_of};
 use crate::model::catalogue::Effect;
 use crate::model::formula::slot;
+use crate::search::Score;
 use crate::search::distinguishability::{Left, Products, chance};
 use crate::search::groups::Group;
 use crate::search::multiplicity::FAMILY_LEVEL;
@@ -31,28 +32,25 @@ pub(super) struct Separating {
     pub never: bool,
 }
 
-/// What is said of two effects that are named together.
-fn after_the_other(other: &str) -> Separating {
-    let says = format!("add {other} first: with it in the model `axiscal diagnose` says which touches separate these");
-    Separating { says, never: false }
-}
-
-/// One for each group. The group of an effect that is named together with another is judged when that other is in the model.
+/// One for each group. Of two effects that are named together each is judged with the other in the model.
 pub(super) fn words(subject: Subject, seen: &Examination, options: &Options) -> Vec<Separating> {
     let found = |g: &Group| g.members.iter().any(|m| seen.search.scores[m.candidate].p_adjusted < FAMILY_LEVEL);
-    let asked: Vec<bool> = seen.groups.iter().map(|g| g.members.len() > 1 && found(g)).collect();
-    let tried = match options.planned {
-        Some(planned) if asked.contains(&true) => tried(subject, seen, planned, &asked).unwrap_or_default(),
+    let asked = |place: &usize| seen.groups[*place].members.len() > 1 && found(&seen.groups[*place]);
+    let named = seen.first_names();
+    let tried = |places: &[usize], with: &[&str]| match options.planned {
+        Some(planned) if !places.is_empty() => tried(subject, seen, planned, (places, with)).unwrap_or_default(),
         _ => Vec::new(),
     };
-    let named = seen.first_names();
-    let each = seen.groups.iter().zip(&asked).enumerate().map(|(i, (group, asked))| {
-        if let (Some(_), true, [first, second]) = (named.get(i), group.members.len() > 1, &named[..]) {
-            after_the_other(if i == 0 { second } else { first })
-        } else if *asked && !tried.is_empty() {
-            by_variation(seen, group, &tried)
+    let (of_two, alone): (Vec<usize>, Vec<usize>) =
+        (0..seen.groups.len()).filter(asked).partition(|place| seen.both.is_some() && *place < named.len());
+    let by_itself = tried(&alone, &[]);
+    let each = seen.groups.iter().enumerate().map(|(place, group)| {
+        let beside_the_other = of_two.contains(&place).then(|| tried(&[place], &[named[1 - place]]));
+        let tried = beside_the_other.as_ref().unwrap_or(&by_itself);
+        if asked(&place) && !tried.is_empty() {
+            by_variation(seen, group, tried)
         } else {
-            Separating { says: by_difference(subject, seen, group), never: false }
+            Separating { says: by_difference(subject, seen, (place, group)), never: false }
         }
     });
     each.collect()
@@ -89,14 +87,19 @@ impl Tried {
     }
 }
 
-/// All variations, cheapest first.
-fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[bool]) -> Result<Vec<Tried>> {
+/// All variations, cheapest first, for the groups at some places and with some effects in the model besides.
+fn tried(
+    subject: Subject,
+    seen: &Examination,
+    planned: &[Planned],
+    (places, with): (&[usize], &[&str]),
+) -> Result<Vec<Tried>> {
     let Subject { machine, catalogue, fit, .. } = subject;
     let name = |i: usize| fit.model.unknowns[i].name.clone();
     let task = Task {
         machine,
         catalogue,
-        effects: effects_of(&fit.outcome.effects, catalogue, machine)?,
+        effects: effects_of(&settings_with(subject, with).effects, catalogue, machine)?,
         held: (0..fit.theta.len())
             .filter(|i| matches!(fit.knowledge[*i], Some(Knowledge::Fixed(_))))
             .map(name)
@@ -109,15 +112,13 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
     let noise = Noise { sigma_mm: fit.noise.sigma_mm, tau_mm: seen.evidence.tau_mm };
     let mut planned = planned.to_vec();
     keep_measured(&mut planned, &fit.data);
-    let mut candidates: Vec<usize> = Vec::new();
-    for group in seen.groups.iter().zip(asked).filter(|g| *g.1).map(|g| g.0) {
-        candidates.extend(group.members.iter().map(|m| m.candidate));
-    }
+    let members = |&place: &usize| seen.groups[place].members.iter().map(move |m| &seen.scores(place)[m.candidate]);
+    let candidates: Vec<&Score> = places.iter().flat_map(members).collect();
     let effects: Vec<(&Effect, Option<f64>)> = candidates
         .iter()
-        .map(|&c| {
-            let variant = seen.order().scores[c].variant;
-            let shape = seen.named.library.candidates()[c].variants[variant].shape;
+        .map(|score| {
+            let c = score.candidate;
+            let shape = seen.named.library.candidates()[c].variants[score.variant].shape;
             (seen.named.effects[c], seen.named.scanned[c].as_ref().map(|_| shape))
         })
         .collect();
@@ -130,7 +131,7 @@ fn tried(subject: Subject, seen: &Examination, planned: &[Planned], asked: &[boo
             let effects = candidates
                 .iter()
                 .zip(spans)
-                .map(|(&c, span)| (c, span, seen.order().scores[c].estimate.clone()))
+                .map(|(score, span)| (score.candidate, span, score.estimate.clone()))
                 .collect();
             let products = Products::new(view.base(), &view.library.matrix());
             Ok(Tried {
@@ -208,10 +209,10 @@ fn by_variation(seen: &Examination, group: &Group, tried: &[Tried]) -> Separatin
 const LEAST_DIFFERENCE_UM: f64 = 0.05;
 
 /// Where the two that lead a group differ most: for who has no plan at hand.
-fn by_difference(subject: Subject, seen: &Examination, group: &Group) -> String {
+fn by_difference(subject: Subject, seen: &Examination, (place, group): (usize, &Group)) -> String {
     let chosen = group.first();
     let Some(rival) = group.members.iter().map(|m| m.candidate).find(|&c| c != chosen) else { return String::new() };
-    let trace = |c: usize| -> DVector<f64> { seen.raw_um(c) * &seen.order().scores[c].estimate };
+    let trace = |c: usize| -> DVector<f64> { seen.raw_um(place, c) * &seen.scores(place)[c].estimate };
     let difference = trace(chosen) - trace(rival);
     let further = |a: &usize, b: &usize| difference[*a].abs().total_cmp(&difference[*b].abs());
     let Some(most) = seen.evidence.used.iter().copied().max_by(further) else { return String::new() };

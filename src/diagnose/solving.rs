@@ -4,7 +4,7 @@
 //! What a step does to the study, and who agrees to it, is up to the [`Host`].
 
 use super::answer::{Candidate, Diagnosis};
-use super::next_step::MachineCheck;
+use super::next_step::{MachineCheck, NextStep};
 use super::verdict::{NotNamed, Unexplained, Verdict};
 use super::{Options, Subject, diagnose};
 use crate::diag::Result;
@@ -224,26 +224,20 @@ pub fn solve(request: Request, host: &mut dyn Host) -> Result<Ending> {
         };
         let Some(id) = host.agree(&proposal)? else { break Stop::ByUser };
         host.change(&Change::Add(id.clone(), proposal.held_out_after_um.filter(|_| proposal.nested)), &added)?;
-        // two effects that are named together are added together
-        let news: Vec<String> = std::iter::once(id).chain(proposal.together_with.clone()).collect();
-        for other in &news[1..] {
-            host.change(&Change::Add(other.clone(), None), &added)?;
-        }
-        let more = [&effects[..], &news[..]].concat();
+        let more = [&effects[..], std::slice::from_ref(&id)].concat();
         let after = (request.fit)(&request.settings_of(&more))?;
-        let ids: Vec<&str> = added.iter().map(|a| a.id.as_str()).chain(news.iter().map(String::as_str)).collect();
+        let ids: Vec<&str> = added.iter().map(|a| a.id.as_str()).chain([id.as_str()]).collect();
         if let Some(refusal) = refused(&after, &ids, request.at_most_size) {
-            host.change(&Change::Remove(news.clone(), Why::Refused(refusal.clone())), &added)?;
-            taken_back.extend(news);
+            host.change(&Change::Remove(vec![id.clone()], Why::Refused(refusal.clone())), &added)?;
+            taken_back.push(id);
             break Stop::Refused(refusal);
         }
-        let of = |id: &String| state.found.candidates.iter().find(|c| c.effect == *id).unwrap_or(&proposal).clone();
-        added.extend(news.into_iter().enumerate().map(|(k, id)| Added {
-            proposal: if k == 0 { proposal.clone() } else { of(&id) },
+        added.push(Added {
+            proposal,
             id,
             name_in_doubt: state.found.verdict.name_in_doubt(),
             rms_um: (state.fit.outcome.rms_um, after.outcome.rms_um),
-        }));
+        });
         effects = more;
         let before = std::mem::replace(&mut state, request.diagnosed(after)?);
         first.get_or_insert(before);
@@ -281,7 +275,9 @@ fn proposed<'d>(found: &'d Diagnosis, added: usize, request: &Request) -> std::r
     if let Some(mistake) = found.mistake() {
         return Err(Stop::Mistake(mistake));
     }
-    match (&found.verdict, found.candidates.first()) {
+    // of two effects that are named together one is added, and the other one is judged again
+    let first = if let NextStep::Add(clear) = found.next_step() { Some(clear) } else { found.candidates.first() };
+    match (&found.verdict, first) {
         (Verdict::MissingEffect(_), Some(first)) if first.proposed => {
             if first.times_usual > request.at_most_size {
                 Err(Stop::TooLarge(first.effect.clone()))

@@ -25,7 +25,7 @@ pub(super) fn open(seen: &Examination) -> Open {
     let best = ln_p(first);
     let tied = |g: &&Group| best.is_finite() && ln_p(g) - best < AS_LIKELY;
     let suspect = |candidate: usize| {
-        let score = &seen.order().scores[candidate];
+        let score = &seen.scores(0)[candidate];
         let shape = seen.named.library.candidates()[candidate].variants[score.variant].shape;
         Suspect {
             id: seen.named.effects[candidate].id.clone(),

@@ -1,9 +1,10 @@
 //! Two effects at once: where no single candidate explains what is left, two simple ones together may.
 
 use super::distributions::ln_p_of_f;
+use super::groups::Group;
 use super::moments::Block;
 use super::score::{Score, Search, held_against};
-use super::{KEPT, Library, Origin, Question};
+use super::{KEPT, Question};
 use nalgebra::{DMatrix, DVector};
 
 /// A candidate of a pair counts where adding it after the other one is no matter of chance by this measure.
@@ -69,18 +70,15 @@ impl Search<'_> {
         best
     }
 
-    /// The scores of a pair with the sizes that each has when the other one is in the model.
+    /// All scores with a candidate in the base model, and the group that another one has then.
     #[must_use]
-    pub fn beside_each_other(&self, pair: &Pair) -> [Score; 2] {
-        [(pair.first, pair.second), (pair.second, pair.first)].map(|(candidate, other)| {
-            let mut base = self.question.base.clone();
-            base.extend(&self.columns(other), KEPT);
-            let mut library = Library::new(self.library.n_rows());
-            library.push("beside the other", Origin::Catalogue, &self.columns(candidate));
-            let mut beside = Search::new(Question { base: &base, ..self.question }, &library);
-            let Score { estimate, covariance, .. } = beside.scores.remove(0);
-            Score { estimate, covariance, ..self.scores[candidate].clone() }
-        })
+    pub fn beside(&self, other: usize, leader: usize) -> (Vec<Score>, Group) {
+        let mut base = self.question.base.clone();
+        base.extend(&self.columns(other), KEPT);
+        let search = Search::new(Question { base: &base, ..self.question }, self.library);
+        let among: Vec<usize> = search.ranking().into_iter().filter(|&c| c != other).collect();
+        let group = search.group_of(leader, &among);
+        (search.scores, group)
     }
 
     fn alone(&self, candidate: usize, residual: &DVector<f64>) -> Alone {
@@ -202,20 +200,22 @@ mod tests {
         let two = columns_of(&library, &[3, CANDIDATES]);
         let residual = noise(&mut rng, ROWS) - &two * DVector::from_vec(vec![0.9, 0.6]);
         let search = Search::new(ask(&residual, &base), &library);
-        let pair = search.best_pair(&[3, CANDIDATES]).unwrap();
+        assert!(search.best_pair(&[3, CANDIDATES]).is_some());
         let left = base.project_columns(&two);
         let gram = left.tr_mul(&left).try_inverse().unwrap();
         let sizes = -(&gram * left.tr_mul(&base.project(&residual)));
         let rest = base.project(&residual) + &left * &sizes;
         let covariance = gram * (rest.norm_squared() / (ROWS - 6 - 2) as f64);
-        for score in search.beside_each_other(&pair) {
-            let place = usize::from(score.candidate == CANDIDATES);
+        for (place, (candidate, other)) in [(3, CANDIDATES), (CANDIDATES, 3)].into_iter().enumerate() {
+            let (scores, group) = search.beside(other, candidate);
+            assert!(group.holds(candidate) && !group.holds(other));
+            let score = &scores[candidate];
             let own = (score.estimate[0], score.covariance[(0, 0)]);
             assert!(
                 (own.0 - sizes[place]).abs() < 1e-9 && (own.1 / covariance[(place, place)] - 1.0).abs() < 1e-9,
                 "{own:?}"
             );
-            let alone = search.scores[score.candidate].estimate[0];
+            let alone = search.scores[candidate].estimate[0];
             assert!((alone - own.0).abs() > 3.0 * own.1.sqrt(), "{alone} {own:?}");
         }
     }

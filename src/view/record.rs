@@ -247,7 +247,7 @@ impl Standing {
         let sizes = [candidate.held_out_before_um, candidate.held_out_after_um];
         let is_tried = sizes.iter().flatten().any(|um| *um > 0.0);
         match d.verdict {
-            _ if place < d.proposed().len() && candidate.together_with.is_some() => Self::ProposedTogether,
+            _ if candidate.proposed && candidate.together_with.is_some() => Self::ProposedTogether,
             _ if candidate.proposed => Self::Proposed,
             _ if candidate.p_adjusted >= FAMILY_LEVEL => Self::NoMoreThanNoise,
             Verdict::TooLittleData(_) => Self::CannotBeJudged,

@@ -34,6 +34,15 @@ pub fn one_of(first: &str, others: &[String]) -> String {
     }
 }
 
+/// What may act in place of one of two effects that are named together.
+pub(super) fn in_place_of(name: &str, others: &[String], or_else: Option<&str>) -> String {
+    let all: Vec<&str> = others.iter().map(String::as_str).chain(or_else).collect();
+    match all[..] {
+        [] => String::new(),
+        _ => format!(" In place of {name} it may be {}: these touches cannot separate them.", all.join(" or ")),
+    }
+}
+
 /// What a variable is called in `where`.
 #[must_use]
 pub fn by(on: &str, is_rotary: &dyn Fn(&str) -> bool) -> String {
@@ -326,17 +335,19 @@ fn missing_effect(d: &Diagnosis, missing: &Missing) -> String {
         Missing::Effect(doubt) => {
             let Some(c) = d.candidates.first() else { return String::new() };
             let or_else = c.or_else.as_ref().map_or_else(String::new, |other| format!(", or {other}"));
-            let what = match (&c.same_as[..], &c.together_with) {
-                (_, Some(other)) => {
-                    let first = one_of(&c.effect, &c.same_as);
-                    format!("{first}, and together with it {other}: no single effect explains both")
+            let what = match (d.proposed(), &c.same_as[..]) {
+                ([first, second], _) => {
+                    format!("{} and {} together: no single effect explains both", first.effect, second.effect)
                 }
-                ([], _) => format!("{} ({}){or_else}", c.name, c.effect),
-                (others, _) => format!("{}{or_else}", one_of(&c.effect, others)),
+                (_, []) => format!("{} ({}){or_else}", c.name, c.effect),
+                (_, others) => format!("{}{or_else}", one_of(&c.effect, others)),
             };
-            let which = match c.same_as.is_empty() && c.or_else.is_none() {
-                true => "",
-                false => " These touches cannot separate them.",
+            let which = match d.proposed() {
+                [_, _] => {
+                    d.proposed().iter().map(|c| in_place_of(&c.effect, &c.same_as, c.or_else.as_deref())).collect()
+                }
+                _ if c.same_as.is_empty() && c.or_else.is_none() => String::new(),
+                _ => " These touches cannot separate them.".to_owned(),
             };
             let rest = if c.remains == Some(true) { " Something else is missing as well." } else { "" };
             let doubt = match doubt {
@@ -351,7 +362,7 @@ fn missing_effect(d: &Diagnosis, missing: &Missing) -> String {
                     c.effect
                 ),
             };
-            let it = if c.together_with.is_some() { "both" } else { "it" };
+            let it = if d.proposed().len() > 1 { "both" } else { "it" };
             let (of, before_um) = match &d.all_touches {
                 None => (String::new(), d.rms_um),
                 Some(all) => (format!(" of all touches, with the {} that are not used now,", all.put_back), all.rms_um),

@@ -15,8 +15,8 @@ const MOST_POWER: usize = 4;
 pub(crate) fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
     let mut out: Vec<String> = d.warnings.iter().map(|w| format!("warning: {w}")).collect();
     // what nothing speaks for is not explained
-    if let Some(first) = d.candidates.first().filter(|c| d.verdict != Verdict::Adequate && c.proposed) {
-        out.extend(of_candidate(first));
+    if d.verdict != Verdict::Adequate {
+        out.extend(d.proposed().iter().flat_map(of_candidate));
     }
     for g in d.gross.iter().take(3) {
         let share = |share: f64| format!("{:.0} %", 100.0 * share);

@@ -217,11 +217,17 @@ fn missing(m: &Material, c: &Candidate) -> String {
     };
     let or: String = others.iter().chain(&c.or_else).map(|other| format!(", or {other}")).collect();
     let which = if or.is_empty() { "" } else { ": these touches cannot separate them" };
-    let what = match m.diagnosis.proposed() {
-        [_, second] => format!("{}{or}, and together with it {}: no single effect explains both", c.name, second.name),
-        _ => format!("{}{size}{or}{which}", c.name),
-    };
     let (whose, has) = whose(m, &c.effect);
+    if let [first, second] = m.diagnosis.proposed() {
+        let others = |c: &Candidate| c.same_as.iter().map(|id| named(m, id)).collect::<Vec<_>>();
+        let in_place: String =
+            [first, second].map(|c| super::diagnose::in_place_of(&c.name, &others(c), c.or_else.as_deref())).concat();
+        return format!(
+            "Two errors are not in the model yet: {} and {}. No single effect explains both.{in_place}",
+            first.name, second.name
+        );
+    }
+    let what = format!("{}{size}{or}{which}", c.name);
     format!("{whose} {has} an error that is not in the model yet: {what}.")
 }
 

@@ -172,7 +172,8 @@ fn found(m: &Material, first: &Candidate, plan_next: &str, c: &Compensation, out
     }
     let known = m.proposed.map(|fit| crate::view::parameters::parameters(m, fit)).unwrap_or_default();
     let beyond = known.iter().filter(|p| p.judgement == Judgement::Beyond);
-    let large: Vec<&ParameterRecord> = beyond.filter(|p| p.effect != first.effect && is_carried(c, p)).collect();
+    let is_named = |p: &&ParameterRecord| m.diagnosis.proposed().iter().any(|named| named.effect == p.effect);
+    let large: Vec<&ParameterRecord> = beyond.filter(|p| !is_named(p) && is_carried(c, p)).collect();
     let ratio = |p: &ParameterRecord| p.tolerance.map_or(0.0, |t| p.value.abs() / t);
     if let Some(worst) = large.iter().max_by(|a, b| ratio(a).total_cmp(&ratio(b))) {
         let n = large.len();

@@ -235,7 +235,8 @@ fn groups_of_earlier_steps_are_asked_too() {
     ok(dir, &["add", "study.toml", "scale-z"]);
     let both = json(dir, &next);
     assert!(asks(&both, "backlash-x") && asks(&both, "scale-z"), "{both}");
-    let groups = |answer: &serde_json::Value| answer["says"].as_str().unwrap().matches(" explains what").count();
+    let groups =
+        |answer: &serde_json::Value| answer["says"].as_str().unwrap().matches(" explains the remaining error").count();
     assert_eq!(groups(&both), 2, "{both}");
     // while an effect is missing, that is the question
     ok(dir, &["remove", "study.toml", "scale-z"]);

@@ -4,6 +4,7 @@ use super::bench::{Act, Bench};
 use super::faults::{self, Fault};
 use super::mistakes::Mistake;
 use axiscal::diagnose::evidence::Evidence;
+use axiscal::diagnose::next_step::NextStep;
 use axiscal::diagnose::{Diagnosis, Options, Subject, diagnose};
 use axiscal::fit::{Fit, Settings, identify_data};
 use axiscal::log::Touch;
@@ -175,9 +176,11 @@ fn pair(bench: &Bench, rng: &mut ChaCha8Rng) -> Option<Pair> {
     while steps.len() < MOST_STEPS {
         let (now, settings) = fit(bench, &touches, &more);
         let d = ask(bench, &now, &settings);
-        let Some(group) = groups(&d).into_iter().next().filter(|_| d.candidates[0].proposed) else { break };
-        more.push(group[0].clone());
-        steps.push(group);
+        // as `solve` does: of two that are named together the one that is clear
+        let clear = if let NextStep::Add(clear) = d.next_step() { Some(clear) } else { d.proposed().first() };
+        let Some(added) = clear else { break };
+        more.push(added.effect.clone());
+        steps.push(std::iter::once(&added.effect).chain(&added.same_as).cloned().collect());
     }
     let named = |step: &Vec<String>, fault: &Fault| step.iter().any(|id| fault.expects.contains(id));
     let both = (0..steps.len())
@@ -291,8 +294,8 @@ pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
         let first = groups.first().filter(|_| d.verdict.is_missing_effect());
         let named = first.is_some_and(|g| g.iter().any(|id| expects.contains(&id.as_str())));
         let gross = d.mistake().is_some() && d.gross.first().is_some_and(|g| expects.contains(&g.hypothesis.as_str()));
-        // a size that no machine has, among the remarks that a user sees
-        let too_large = d.oversized.iter().take(3).any(|o| expects.contains(&o.effect.as_str()));
+        // a size that no machine has: the verdict names the first
+        let too_large = d.oversized.first().is_some_and(|o| expects.contains(&o.effect.as_str()));
         result.led |= named || gross || too_large;
         let cannot_be_tested = |id: &str| d.needs_temperature.iter().any(|e| e == id);
         let asks_for_temperatures = expects.iter().any(|id| cannot_be_tested(id) && d.says.contains(id));

@@ -56,8 +56,9 @@ function standing(effect, score) {
   if (!score.visible) return "has no effect on these touches";
   const found = state.behind?.diagnosis;
   const first = found?.candidates[0];
-  const isFirst = first?.effect === effect.id || first?.same_as.includes(effect.id);
-  const extra = candidate(effect.id)?.proposed ? ", proposed" : score.passes && first?.proposed && !isFirst ? ", explains less than the first" : "";
+  const isFirst = found?.candidates.some((c, k) => (k === 0 || c.proposed) && (c.effect === effect.id || c.same_as.includes(effect.id)));
+  const named = candidate(effect.id);
+  const extra = named?.proposed ? (named.together_with ? ", proposed together with another" : ", proposed") : score.passes && first?.proposed && !isFirst ? ", explains less than the first" : "";
   // of several sizes the one that stands out most
   const certainty = (p) => Math.abs(p.value) / p.sigma || 0;
   const size = score.parameters.reduce((best, p) => (!best || certainty(p) > certainty(best) ? p : best), null);

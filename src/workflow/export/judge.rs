@@ -82,8 +82,12 @@ pub(super) fn judged(loaded: &Loaded, fit: &Fit, force: bool, env: &dyn Environm
     }
     let word = found.verdict.as_str();
     let doubts = doubts(loaded, &found);
-    let named = found.candidates.first().filter(|_| found.verdict.is_missing_effect());
-    let named = named.map_or_else(String::new, |c| format!(" ({})", c.effect));
+    let two = found.proposed().get(1);
+    let named = found.candidates.first().into_iter().chain(two).map(|c| c.effect.as_str());
+    let named = match found.verdict.is_missing_effect() {
+        true => format!(" ({})", named.collect::<Vec<_>>().join(" and ")),
+        false => String::new(),
+    };
     let radius_mm = loaded.study.tolerance.radius_mm;
     let refused = match (found.mistake(), doubts.first()) {
         (Some(mistake), _) => Some(mistake),

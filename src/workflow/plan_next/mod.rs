@@ -11,6 +11,7 @@ use super::{Environment, Loaded};
 use crate::design::questions::{Pair, Questions, Suspect};
 use crate::design::{self, LinearisedPlan, Room};
 use crate::diag::{Failure, Finding, Result, source};
+use crate::diagnose::next_step::NextStep;
 use crate::diagnose::unresolved_pairs;
 use crate::diagnose::verdict::{NotNamed, TooLittle, Unexplained};
 use crate::diagnose::{Diagnosis, Options, Verdict, sketch::sketch};
@@ -188,15 +189,18 @@ impl Open {
         Ok(Ok(open))
     }
 
-    /// Of two effects that are named together the first one's group is judged with the other in the model: what the other does is no
-    /// difference between its members.
+    /// Of two effects that are named together the one that is clear is in the model when the other one is asked about; else the second.
     fn with_the_other_of_two(self, loaded: &Loaded, request: &Request) -> Result<Self> {
-        let [_, second] = self.found.proposed() else { return Ok(self) };
+        let other = match (self.found.proposed(), self.found.next_step()) {
+            ([_, _], NextStep::Add(clear)) => clear.effect.clone(),
+            ([_, second], _) => second.effect.clone(),
+            _ => return Ok(self),
+        };
         if !request.effects.is_empty() {
             return Ok(self);
         }
         let mut settings = self.settings;
-        settings.effects.push(second.effect.clone());
+        settings.effects.push(other);
         Self::look(loaded, settings)
     }
 
