@@ -120,7 +120,8 @@ pub(super) fn put_together(
     // an effect that explains more than any shape without a name says on what its own formulas depend
     let best_shape =
         seen.dependences.iter().filter(|d| d.p_adjusted < FAMILY_LEVEL).map(|d| d.share).fold(0.0, f64::max);
-    if let Some(first) = candidates.first().filter(|c| c.proposed && c.share + AS_MUCH >= best_shape)
+    let by_itself = |c: &&Candidate| c.proposed && c.together_with.is_none() && c.share + AS_MUCH >= best_shape;
+    if let Some(first) = candidates.first().filter(by_itself)
         && let Some(effect) = subject.catalogue.get(&first.effect, subject.machine)
         && let Some(on) =
             effect.terms.iter().find_map(|t| t.formula.variables().into_iter().find(|v| words::is_plain(v)))

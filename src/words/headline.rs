@@ -160,15 +160,19 @@ pub(crate) fn in_question(m: &Material, c: &Candidate) -> String {
 /// What the missing effect does to the touches, in figures.
 fn falls(m: &Material, c: &Candidate) -> String {
     let d = m.diagnosis;
-    let (sizes, moves) = match is_one_size(c) {
+    let (with, they_move, in_place) = match d.proposed() {
+        [first, second] => {
+            let others = |c: &Candidate| c.same_as.iter().map(|id| named(m, id)).collect::<Vec<_>>();
+            let in_place = |c: &Candidate| super::diagnose::in_place_of(&c.name, &others(c), c.or_else.as_deref());
+            ("both", "Together they move", in_place(first) + &in_place(second))
+        }
+        _ => ("this effect", "It moves", String::new()),
+    };
+    let (sizes, moves) = match is_one_size(c) && d.proposed().len() < 2 {
         true => (sizes(m, c), None),
         false => (Vec::new(), most_moved_um(m)),
     };
     let sizes = if sizes.is_empty() { String::new() } else { format!(" Its size: {}.", sizes.join("; ")) };
-    let (with, they_move) = match d.proposed() {
-        [_, _] => ("both", "Together they move"),
-        _ => ("this effect", "It moves"),
-    };
     let moves = moves.map_or_else(String::new, |most| format!(" {they_move} single touches by up to {}.", um(most)));
     let rest = if c.remains == Some(true) { " Something else is missing as well." } else { "" };
     let (of, now_um, then_um) = match &d.all_touches {
@@ -178,7 +182,7 @@ fn falls(m: &Material, c: &Candidate) -> String {
         }
     };
     format!(
-        "The residual{of} is {}, and {} with {with} in the model; the probe noise is {}.{sizes}{moves}{rest}",
+        "The residual{of} is {}, and {} with {with} in the model; the probe noise is {}.{sizes}{moves}{rest}{in_place}",
         um(now_um),
         um(then_um),
         um(d.noise_um)
@@ -219,11 +223,8 @@ fn missing(m: &Material, c: &Candidate) -> String {
     let which = if or.is_empty() { "" } else { ": these touches cannot separate them" };
     let (whose, has) = whose(m, &c.effect);
     if let [first, second] = m.diagnosis.proposed() {
-        let others = |c: &Candidate| c.same_as.iter().map(|id| named(m, id)).collect::<Vec<_>>();
-        let in_place: String =
-            [first, second].map(|c| super::diagnose::in_place_of(&c.name, &others(c), c.or_else.as_deref())).concat();
         return format!(
-            "Two errors are not in the model yet: {} and {}. No single effect explains both.{in_place}",
+            "Two errors are not in the model yet: {} and {}. No single effect explains both.",
             first.name, second.name
         );
     }
