@@ -6,15 +6,14 @@ use super::evidence::Evidence;
 use super::first_order::FirstOrder;
 use super::folds::Folds;
 use super::next_step::MachineCheck;
-use super::{Examination, Subject, noise_um, separating_touches, setup_mistakes};
+use super::{Examination, Subject, noise_um, other_causes, separating_touches, setup_mistakes};
 use crate::fit::Fit;
 use crate::fit::candidates::NoValue;
-use crate::model::catalogue::Place;
 use crate::model::data::Origin;
 use crate::search::dependence::Dependence;
 use crate::search::groups::Group;
 use crate::search::multiplicity::FAMILY_LEVEL;
-use crate::search::pattern_tests::{Direction, Features, Kind};
+use crate::search::pattern_tests::{Features, Kind};
 use crate::search::{Score, power, side_by_side};
 use crate::units::{mm_from_um, um_from_mm};
 use crate::words::diagnose as words;
@@ -224,9 +223,9 @@ pub(super) fn put_together(
         sketchable,
     };
     let verdict = findings.verdict(decided);
-    jump_of_what(seen, features, &mut candidates);
-    let needs_temperature = without_temperature(fit, seen);
-    room_or_time(fit, seen, &mut candidates);
+    other_causes::jump_of_what(seen, features, &mut candidates);
+    let needs_temperature = other_causes::without_temperature(fit, seen);
+    other_causes::room_or_time(fit, seen, &mut candidates);
     Diagnosis {
         format: FORMAT,
         verdict,
@@ -270,49 +269,6 @@ pub(super) fn x_unit(kind: Option<Kind>) -> &'static str {
         Some(Kind::Time) => "h",
         Some(Kind::Temperature) => "degC",
         _ => "1",
-    }
-}
-
-/// Effects that go with the temperature, where no touch carries one: whether they act is not to be seen.
-fn without_temperature(fit: &Fit, seen: &Examination) -> Vec<String> {
-    if fit.data.observations.iter().any(|o| o.has_temperature) {
-        return Vec::new();
-    }
-    let warm = seen.named.effects.iter().filter(|e| e.terms.iter().any(|t| t.formula.variables().contains(&"T")));
-    warm.map(|e| e.id.clone()).collect()
-}
-
-/// What goes with time may go with the temperature of the room, which a log without temperatures does not show.
-fn room_or_time(fit: &Fit, seen: &Examination, candidates: &mut [Candidate]) {
-    if without_temperature(fit, seen).is_empty() {
-        return;
-    }
-    for (candidate, group) in candidates.iter_mut().filter(|c| c.proposed).zip(&seen.groups) {
-        let effect = seen.named.effects[group.first()];
-        let with_time = effect.terms.iter().any(|t| t.formula.variables().contains(&"t"));
-        if effect.id == candidate.effect && with_time && !effect.is_incident() {
-            candidate.or_else = Some("what goes with the room's temperature (this log carries none)".to_owned());
-        }
-    }
-}
-
-/// Blocks that all stand elsewhere from some moment on are one reading of a jump. Where a jump at the same moment in a frame
-/// that stands still does as well, the machine or the probe may have made it.
-fn jump_of_what(seen: &Examination, features: &Features, candidates: &mut [Candidate]) {
-    let Some((first, group)) = candidates.first_mut().filter(|c| c.proposed).zip(seen.groups.first()) else { return };
-    let chosen = group.first();
-    let effect = seen.named.effects[chosen];
-    let of_blocks =
-        effect.id == first.effect && effect.is_incident() && effect.terms.iter().all(|t| t.place == Place::Block);
-    let Some(clock) = features.variables.iter().find(|v| v.kind == Kind::Time).filter(|_| of_blocks) else { return };
-    let at_h = seen.named.library.candidates()[chosen].variants[seen.order().scores[chosen].variant].shape;
-    let still: Vec<&Direction> = features.directions.iter().filter(|d| d.name.starts_with("machine-")).collect();
-    let n = features.block.len();
-    let after = |i: usize| f64::from(u8::from(clock.values[i] >= at_h));
-    let raw_mm = DMatrix::from_fn(n, still.len(), |i, d| mm_from_um(still[d].weight[i] * after(i)));
-    let columns = seen.evidence.whiten(raw_mm);
-    if super::effects_versus_patterns::as_well(seen.evidence.question(), &seen.order().columns(chosen), &columns) {
-        first.or_else = Some("the probe or the machine itself jumped".to_owned());
     }
 }
 

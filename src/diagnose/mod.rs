@@ -23,6 +23,7 @@ pub mod next_step;
 mod no_usable_touches;
 mod not_identifiable;
 pub mod odd_block;
+mod other_causes;
 mod outlying_groups;
 pub mod oversized;
 mod pairs;
