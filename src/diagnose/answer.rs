@@ -94,7 +94,13 @@ impl Diagnosis {
     /// What is proposed: one effect, or two that are named together.
     #[must_use]
     pub fn proposed(&self) -> &[Candidate] {
-        &self.candidates[..self.candidates.iter().take_while(|c| c.proposed).count()]
+        let first = self.candidates.first().filter(|first| first.proposed);
+        // behind a set-up mistake an effect may stand as well: that is no pair
+        let second = self
+            .candidates
+            .get(1)
+            .filter(|second| first.is_some_and(|f| f.together_with.as_ref() == Some(&second.effect)));
+        &self.candidates[..usize::from(first.is_some()) + usize::from(second.is_some())]
     }
 
     /// The effect that passes the test with all candidates counted in and that unused measurements do not confirm.
