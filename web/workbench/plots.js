@@ -306,8 +306,8 @@ let falling = 0;
 /** When the marks will have come to rest. */
 let restAt = 0;
 
-/** The marks fall from where they are to new residuals on a canvas; then the library draws the same. */
-function fall(to) {
+/** The marks fall from where they are to new residuals on a canvas; then the library draws the same, where these are not only expected. */
+function fall(to, expected = false) {
   const mine = ++falling;
   const from = shownAt;
   const began = performance.now();
@@ -323,7 +323,7 @@ function fall(to) {
     if (!frame(plot, cell, traces(at).marks, bandOf())) return draw();
     plot.dataset.framed = state.live.version;
     if (t < 1) requestAnimationFrame(turn);
-    else if (to === state.live.residual_um) later("plot", () => { if (stale && mine === falling) draw(); });
+    else if (!expected) later("plot", () => { if (stale && mine === falling) draw(); });
   };
   turn();
 }
@@ -336,7 +336,7 @@ export function expect(taken) {
   if (!made || !seen() || !state.live) return;
   ghosts = state.live.residual_um;
   stale = true;
-  fall(state.live.residual_um.map((r, i) => r - taken[i]));
+  fall(state.live.residual_um.map((r, i) => r - taken[i]), true);
 }
 
 /** What was expected did not come: the marks go back. */
