@@ -9,10 +9,6 @@ use crate::search::{KEPT, Library, Origin, Pair, Question, Score, Search, lack_o
 /// So many of the most significant groups are paired: effects that these touches cannot separate fill no list.
 const AMONG: usize = 10;
 
-/// The criterion of two effects must be lower than that of one by so much: strong evidence (Raftery, Sociological Methodology 25
-/// (1995) 111).
-const CLEARLY: f64 = 10.0;
-
 /// The pair that is to be named in place of what the tests of single effects decide: together they explain all that no one does, no
 /// pattern says it with less, and held-out touches bear them out.
 pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision) -> Option<Pair> {
@@ -22,7 +18,7 @@ pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision) ->
     let search = &seen.search;
     let among = among(search);
     let best = among.iter().map(|&c| search.bic(c)).fold(f64::INFINITY, f64::min);
-    let pair = search.best_pair(&among).filter(|pair| pair.bic < best - CLEARLY)?;
+    let pair = search.best_pair(&among).filter(|pair| pair.bic < best)?;
     if decision.confirmed {
         // the first effect of two is found by itself, and the other one after it
         let leader: &Group = seen.groups.first()?;

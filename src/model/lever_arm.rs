@@ -74,11 +74,13 @@ fn arm_name(id: &str) -> String {
     format!("arm_{}", id.replace('-', "_"))
 }
 
-/// About which point an axis turns where it should not turn.
+/// About which point an axis turns where it should not turn, or turns further than it should.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TurningPoint {
     /// The axis that turns.
     pub axis: AxisName,
+    /// It turns the way it is made to turn: about its own direction.
+    pub about_itself: bool,
     /// How far the point lies along x, y, z (0, 1, 2) from there, mm: one direction or two.
     pub off_mm: Vec<(usize, f64)>,
     /// From where.
@@ -105,8 +107,10 @@ pub fn turning_point(
     effect: &Effect,
     value: impl Fn(usize) -> Option<(f64, f64)>,
 ) -> Option<TurningPoint> {
-    let (Place::Before(name) | Place::After(name)) = effect.terms.first()?.place else { return None };
+    let first = effect.terms.first()?;
+    let (Place::Before(name) | Place::After(name)) = first.place else { return None };
     let axis = machine.axis(name)?;
+    let about_itself = name.is_rotary() && first.component == name.index();
     let ball = machine.reference.ball;
     let (stated, from) = match (name.is_rotary(), axis.side) {
         (true, Side::Tool) => (ball, From::Pivot),
@@ -140,7 +144,7 @@ pub fn turning_point(
             off_mm
         }
     };
-    Some(TurningPoint { axis: name, off_mm, from })
+    Some(TurningPoint { axis: name, about_itself, off_mm, from })
 }
 
 fn component(letter: &str) -> Option<usize> {
@@ -173,10 +177,13 @@ mod tests {
             turning_point(&machine, effect, |i| Some((if is_arm(i) { arm_mm } else { 0.0 }, 0.0)))
         };
         // C of the table: its arm counts from the height of the ball
-        let below = TurningPoint { axis: AxisName::C, off_mm: vec![(2, -180.0)], from: From::Ball };
+        let below = TurningPoint { axis: AxisName::C, about_itself: false, off_mm: vec![(2, -180.0)], from: From::Ball };
         assert_eq!(at("swivel-head", "tilt-c-1", -180.0), Some(below));
-        let aside = TurningPoint { axis: AxisName::B, off_mm: vec![(1, 90.0)], from: From::Pivot };
+        let aside = TurningPoint { axis: AxisName::B, about_itself: false, off_mm: vec![(1, 90.0)], from: From::Pivot };
         assert_eq!(at("swivel-head", "tilt-b-2", 90.0), Some(aside));
+        // the weight of the head turns B about its own direction, but with what carries it
+        let above = TurningPoint { axis: AxisName::B, about_itself: true, off_mm: vec![(2, 150.0)], from: From::Pivot };
+        assert_eq!(at("swivel-head", "head-tilt", 150.0), Some(above));
         // X carries the spindle: its arm counts from R, and the ball is 202.684 mm below that
         let above = at("trunnion", "carriage-sag-x", 0.0).unwrap();
         assert!((above.off_mm[0].1 - 202.684).abs() < 1e-12 && above.from == From::Ball, "{above:?}");

@@ -49,7 +49,11 @@ pub(crate) fn turning_point(point: &TurningPoint) -> String {
             format!("at {} from the {from}", each.join(", "))
         }
     };
-    if point.axis.is_rotary() {
+    if point.about_itself && far.is_empty() {
+        format!("turn about a point {place}: gear or clamp of {}, not what carries it", point.axis)
+    } else if point.about_itself {
+        format!("turn about a point {place}: what carries {}, not its gear or clamp", point.axis)
+    } else if point.axis.is_rotary() {
         format!("wobble of {} about a point {place}: the bearing, not run-out", point.axis)
     } else {
         format!("turn of the carriage of {} about a point {place}: the guideway, not straightness or scale", point.axis)

@@ -93,7 +93,7 @@ fn pick<'a>(bench: &'a Bench, rotary: bool, rng: &mut ChaCha8Rng) -> &'a Axis {
 }
 
 /// Directions of R: along the axis and across it.
-fn along(axis: AxisName) -> V {
+pub fn along(axis: AxisName) -> V {
     unit(axis.index() % 3)
 }
 

@@ -1,7 +1,7 @@
 //! What can be wrong with head, probe, blocks and temperature.
 
 use super::bench::Bench;
-use super::faults::{Draw, Fault, UM, small, unit};
+use super::faults::{Draw, Fault, UM, along, small, unit};
 use super::forward::{Slip, V};
 use axiscal::axes::AxisName;
 use axiscal::machine::Side;
@@ -58,9 +58,17 @@ fn sinking_head(bench: &Bench, rng: &mut ChaCha8Rng) -> Option<Fault> {
     }))
 }
 
-/// The weight of the head turns it on.
-fn leaning_head(bench: &Bench, _: &mut ChaCha8Rng) -> Option<Fault> {
+/// The weight of the head turns it on: by itself, or with the ram that carries it, about a bearing above.
+fn leaning_head(bench: &Bench, rng: &mut ChaCha8Rng) -> Option<Fault> {
     let name = tilting(bench)?;
+    if rng.random_bool(0.5) {
+        let above = rng.random_range(50.0..400.0);
+        let (about, i) = (bench.machine.reference.pivot + unit(2) * above, name.index());
+        let what = format!("head turned by its weight with its ram, about a point {above:.0} mm above the pivot");
+        return Some(Fault::new(what, &["head-tilt"], move |at, size, wrong| {
+            wrong.before[i].push(Slip::turn(along(name) * (1e-5 * size * at.q[i].sin()), about));
+        }));
+    }
     Some(Fault::new("head turned by its weight", &["head-tilt"], move |at, size, wrong| {
         wrong.joint[name.index()] += 1e-5 * size * at.q[name.index()].sin();
     }))

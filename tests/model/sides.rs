@@ -265,6 +265,22 @@ fn a_wobble_acts_about_its_bearing() {
     check(&table, touch(Z), "tilt-c-1", &below, "", 0.0003);
 }
 
+/// The weight of the head turns it by 10 µrad about Y at B = 90, by -10 µrad at B = -90.
+#[test]
+fn a_head_turns_about_its_pivot_or_with_what_carries_it() {
+    let machine = table();
+    let touch = |normal| on(&machine, [0.0, 0.0, -202.684], normal).tilted(-90.0);
+    // At B = -90 the ball is 202.684 mm from the pivot to +X: turned by -10e-6 about Y it is 202.684 * 10e-6 = 0.002 026 84 higher,
+    // and its coordinate is so much lower where it meets the upper face. Nothing goes sideways.
+    let by_itself = [("EBBs", 10.0), ("arm_head_tilt", 0.0)];
+    check(&machine, touch(Z), "head-tilt", &by_itself, "", -0.002_026_84);
+    check(&machine, touch(X), "head-tilt", &by_itself, "", 0.0);
+    // with a ram that turns about a point 200 mm above the pivot: the pivot itself goes 200 * 10e-6 = 0.002 to +X
+    let with_its_ram = [("EBBs", 10.0), ("arm_head_tilt", 200.0)];
+    check(&machine, touch(Z), "head-tilt", &with_its_ram, "", -0.002_026_84);
+    check(&machine, touch(X), "head-tilt", &with_its_ram, "", -0.002);
+}
+
 /// The carriage of X pitches by 20 µrad at 300 mm, by 10 µrad about Y at X = 150.
 #[test]
 fn a_pitch_of_a_guideway_acts_on_what_its_carriage_bears() {

@@ -184,7 +184,7 @@ pub fn back_to_the_ball(target: Target, machine: &Machine) -> Vec<(Target, f64)>
 
 /// Turns that act about a point at `arm_…` mm along a direction (0, 1, 2: x, y, z): each point of what is turned moves less, or more,
 /// by the turn times that distance.
-fn about_a_point(mut turns: Vec<Parameter>, id: &str, along: usize, settings: Settings<'_>) -> Vec<Parameter> {
+pub(super) fn about_a_point(mut turns: Vec<Parameter>, id: &str, along: usize, settings: Settings<'_>) -> Vec<Parameter> {
     let name = format!("arm_{}", id.replace('-', "_"));
     let arm = settings(&name).unwrap_or(0.0);
     for turn in &mut turns {

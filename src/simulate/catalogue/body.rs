@@ -1,6 +1,6 @@
 //! What weight does to head and table, and what is wrong with the artefact.
 
-use super::axes::SPAN_MM;
+use super::axes::{SPAN_MM, about_a_point};
 use super::unit::Unit::{H, One, PpmPerK, Um, Urad};
 use super::{Parameter, Refusal, Settings, along, dof_letter};
 use crate::axes::AxisName;
@@ -24,12 +24,13 @@ pub fn parameters(id: &str, machine: &Machine, settings: Settings<'_>) -> Result
             let acts = [(Target::BallInMachine(2), Shape::Tilt, -1.0)];
             Ok(vec![Parameter::new("head_sag", Um, acts).alias("k").alias("sag")])
         }
-        // and its weight turns it further about its own axis
+        // and its weight turns it further about its own axis, or about a point above that, with what carries it
         "head-tilt" => {
             let axis = tilting_head(machine)?;
             let target = Target::OwnLine { axis, after: false, dof: along(axis) + 3 };
             let name = format!("E{}{axis}s", dof_letter(along(axis) + 3));
-            Ok(vec![Parameter::at(name, Urad, target, Shape::Sine(axis, 1.0)).alias("head_tilt").alias("k")])
+            let turn = Parameter::at(name, Urad, target, Shape::Sine(axis, 1.0)).alias("head_tilt").alias("k");
+            Ok(about_a_point(vec![turn], id, 2, settings))
         }
         "table-sag" => table_sag(machine),
         "table-load" => table_load(machine),

@@ -113,6 +113,9 @@ fn harmonics_of_the_head_move_the_ball() {
         [0.0, 0.0, arm_um / 2.0 * quarter],
     );
     on_the_paper_machine("head-tilt", &[("EBBs", 100.0)], (-90.0, 0.0), "head", [0.0, 0.0, -arm_um]);
+    // -100 µrad about Y through a point 200 mm above the pivot: what hangs 200 mm below that point goes 20 µm to +X
+    let above = [("EBBs", 100.0), ("arm_head_tilt", 200.0)];
+    on_the_paper_machine("head-tilt", &above, (-90.0, 0.0), "head", [-20.0, 0.0, -arm_um]);
     on_the_paper_machine("head-sag", &[("head_sag", 5.0)], (-30.0, 0.0), "head", [0.0, 0.0, 2.5]);
 }
 
