@@ -62,7 +62,10 @@ fn main() {
                 100.0 * set_ups.iter().map(|r| r.covered).sum::<f64>() / count
             );
         }
-        wrong.extend(coverage::check(case, &summary, 0.0));
+        // with a wrong declared value the bounds do not hold: the table shows how far off the uncertainties are
+        if name != "scatter" {
+            wrong.extend(coverage::check(case, &summary, 0.0));
+        }
     }
     println!(
         "\n| machine, programs, τ | χ²/dof | RMS error / bound | inside its 95 % interval |\n|---|---|---|---|\n{table}"

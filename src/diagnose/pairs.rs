@@ -16,9 +16,7 @@ pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision) ->
         return None;
     }
     let search = &seen.search;
-    let among = among(search);
-    let best = among.iter().map(|&c| search.bic(c)).fold(f64::INFINITY, f64::min);
-    let pair = search.best_pair(&among).filter(|pair| pair.bic < best)?;
+    let pair = better_than_one(search)?;
     if decision.confirmed {
         // the first effect of two is found by itself, and the other one after it
         let leader: &Group = seen.groups.first()?;
@@ -43,6 +41,15 @@ pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision) ->
     library.push("both", Origin::Catalogue, &joint);
     let held = held_out(search.question, &library, &seen.evidence.visits, Choice::Given(0));
     bears_out(&held).then_some(pair)
+}
+
+/// Two criteria that differ by less are equal: the two effects are then one effect in parts.
+const EQUAL: f64 = 1e-6;
+
+/// The pair that takes away most, where its criterion is lower than that of any single effect.
+fn better_than_one(search: &Search) -> Option<Pair> {
+    let best = (0..search.scores.len()).map(|c| search.bic(c)).fold(f64::INFINITY, f64::min);
+    search.best_pair(&among(search)).filter(|pair| pair.bic < best - EQUAL)
 }
 
 /// Candidates that are paired.
@@ -91,6 +98,31 @@ mod tests {
     use nalgebra::DMatrix;
 
     const ROWS: usize = 200;
+
+    /// Two effects act. A third candidate has the columns of both and some more: it says the same with more parameters, and the pair
+    /// wins, however narrowly. With the two columns alone it says the same with as many, and is one effect in place of two.
+    #[test]
+    fn two_simple_effects_win_where_their_criterion_is_lower() {
+        for (more, wins) in [(0, false), (1, true), (2, true)] {
+            let mut rng = rng(44);
+            let base = Basis::new(&noise_matrix(&mut rng, ROWS, 4));
+            let columns = noise_matrix(&mut rng, ROWS, 4);
+            let mut library = Library::new(ROWS);
+            library.push("c0", Origin::Catalogue, &columns.columns(0, 1).into_owned());
+            library.push("c1", Origin::Catalogue, &columns.columns(1, 1).into_owned());
+            library.push("composite", Origin::Catalogue, &columns.columns(0, 2 + more).into_owned());
+            let act = columns.column(0) + columns.column(1) * 0.8;
+            let residual = (noise_matrix(&mut rng, ROWS, 1) - act).column(0).into_owned();
+            let search = Search::new(Question { residual: &residual, base: &base, pure: None }, &library);
+            let found = better_than_one(&search).map(|pair| (pair.first, pair.second));
+            assert_eq!(found.is_some(), wins, "{more} more columns");
+            if let Some((first, second)) = found {
+                assert_eq!([first.min(second), first.max(second)], [0, 1]);
+                let by = search.bic(2) - search.best_pair(&[0, 1]).unwrap().bic;
+                assert!(by > 0.0 && by < 10.0 * more as f64, "{more} more columns: {by}");
+            }
+        }
+    }
 
     /// Two effects act, each has a twin, and a third effect is stronger than both of them alone.
     #[test]

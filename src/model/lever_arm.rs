@@ -2,7 +2,7 @@
 //! is displaced in proportion to the distance. That distance is unknown, so that it is a parameter.
 
 use super::as_written::{EffectAsWritten, Grid, Placed, Scan, ShapeAsWritten, TermAsWritten};
-use super::catalogue::{Effect, Place};
+use super::catalogue::{About, Effect, Place};
 use super::reference_points::own_point;
 use crate::axes::AxisName;
 use crate::machine::{Machine, Side};
@@ -83,6 +83,8 @@ pub struct TurningPoint {
     pub about_itself: bool,
     /// How far the point lies along x, y, z (0, 1, 2) from there, mm: one direction or two.
     pub off_mm: Vec<(usize, f64)>,
+    /// Standard uncertainty of that distance, mm, where there is one distance and its uncertainty is known.
+    pub sigma_mm: Option<f64>,
     /// From where.
     pub from: From,
 }
@@ -96,11 +98,12 @@ pub enum From {
     Pivot,
 }
 
-/// A turn is one where it is so many standard uncertainties.
-const SURE: f64 = 3.0;
+/// A turn is one, and a distance is not 0, where it is so many standard uncertainties.
+pub const SURE: f64 = 3.0;
 
 /// Where the point lies about which an effect turns its axis; `value`: of each of its parameters, by its place, and its standard
-/// uncertainty, in its unit. None where the effect has no such point, hardly turns, or may not turn at all.
+/// uncertainty, in its unit (infinite: not known). None where the effect has no such point; where displacements beside the turn say where
+/// the point is, also where it may not turn at all.
 #[must_use]
 pub fn turning_point(
     machine: &Machine,
@@ -115,13 +118,18 @@ pub fn turning_point(
     let (stated, from) = match (name.is_rotary(), axis.side) {
         (true, Side::Tool) => (ball, From::Pivot),
         (true, Side::Workpiece) => (own_point(machine, axis), From::Ball),
-        (false, Side::Workpiece) => (ball, From::Ball),
-        // a head's carriage: its own coordinates begin at the origin of R
-        (false, Side::Tool) => (Vector3::zeros(), From::Ball),
+        (false, _) if effect.about == Some(About::Ball) => (ball, From::Ball),
+        // the coordinates of a carriage begin at the origin of R
+        (false, _) => (Vector3::zeros(), From::Ball),
     };
     let off = |along: usize, mm: f64| (along, stated[along] - ball[along] + mm);
+    let mut sigma_mm = None;
     let off_mm = match effect.arm? {
-        Arm::Distance { parameter, along } => vec![off(along, value(parameter)?.0)],
+        Arm::Distance { parameter, along } => {
+            let (mm, sigma) = value(parameter)?;
+            sigma_mm = Some(sigma).filter(|s| s.is_finite());
+            vec![off(along, mm)]
+        }
         Arm::Displaced { turn, shifts } => {
             // a turn θω̂ and a displacement t leave the point ω̂ × t/θ where it is
             let factor = |parameter: usize| effect.parameters.get(parameter).map(|p| p.factor);
@@ -144,7 +152,7 @@ pub fn turning_point(
             off_mm
         }
     };
-    Some(TurningPoint { axis: name, about_itself, off_mm, from })
+    Some(TurningPoint { axis: name, about_itself, off_mm, sigma_mm, from })
 }
 
 fn component(letter: &str) -> Option<usize> {
@@ -174,19 +182,39 @@ mod tests {
             let machine = crate::machine::built_in(machine).unwrap().unwrap();
             let effect = catalogue.get(id, &machine).unwrap();
             let is_arm = |i: usize| effect.parameters[i].name.starts_with("arm_");
-            turning_point(&machine, effect, |i| Some((if is_arm(i) { arm_mm } else { 0.0 }, 0.0)))
+            turning_point(&machine, effect, |i| Some((if is_arm(i) { arm_mm } else { 0.0 }, 9.0)))
         };
         // C of the table: its arm counts from the height of the ball
-        let below = TurningPoint { axis: AxisName::C, about_itself: false, off_mm: vec![(2, -180.0)], from: From::Ball };
+        let below = TurningPoint {
+            axis: AxisName::C,
+            about_itself: false,
+            off_mm: vec![(2, -180.0)],
+            sigma_mm: Some(9.0),
+            from: From::Ball,
+        };
         assert_eq!(at("swivel-head", "tilt-c-1", -180.0), Some(below));
-        let aside = TurningPoint { axis: AxisName::B, about_itself: false, off_mm: vec![(1, 90.0)], from: From::Pivot };
+        let aside = TurningPoint {
+            axis: AxisName::B,
+            about_itself: false,
+            off_mm: vec![(1, 90.0)],
+            sigma_mm: Some(9.0),
+            from: From::Pivot,
+        };
         assert_eq!(at("swivel-head", "tilt-b-2", 90.0), Some(aside));
         // the weight of the head turns B about its own direction, but with what carries it
-        let above = TurningPoint { axis: AxisName::B, about_itself: true, off_mm: vec![(2, 150.0)], from: From::Pivot };
+        let above = TurningPoint {
+            axis: AxisName::B,
+            about_itself: true,
+            off_mm: vec![(2, 150.0)],
+            sigma_mm: Some(9.0),
+            from: From::Pivot,
+        };
         assert_eq!(at("swivel-head", "head-tilt", 150.0), Some(above));
-        // X carries the spindle: its arm counts from R, and the ball is 202.684 mm below that
-        let above = at("trunnion", "carriage-sag-x", 0.0).unwrap();
-        assert!((above.off_mm[0].1 - 202.684).abs() < 1e-12 && above.from == From::Ball, "{above:?}");
+        // X carries the spindle: its arm counts from the ball as that of a table does
+        for machine in ["trunnion", "swivel-head"] {
+            let above = at(machine, "carriage-sag-x", 70.0).unwrap();
+            assert!(above.off_mm == [(2, 70.0)] && above.from == From::Ball, "{above:?}");
+        }
         assert_eq!(at("trunnion", "zero-a", 0.0), None);
     }
 
@@ -195,8 +223,8 @@ mod tests {
         use super::turning_point;
         let catalogue = Catalogue::built_in().unwrap();
         let machine = crate::machine::built_in("trunnion").unwrap().unwrap();
-        // Y bears the table. 50 urad about z through a point 300 mm from the ball to Y-, 100 mm to X+: what stands at the ball goes
-        // by 50 urad times 300 mm to -x and by 50 urad times 100 mm to -y
+        // 50 urad about z through a point 300 mm from the ball to Y-, 100 mm to X+: what is at the ball goes by 50 urad times 300 mm
+        // to -x and by 50 urad times 100 mm to -y
         let effect = catalogue.get("angular-cy", &machine).unwrap();
         let value = |x: f64, y: f64, turn: f64| {
             move |i: usize| match effect.parameters[i].name.as_str() {

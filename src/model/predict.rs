@@ -235,11 +235,10 @@ pub(super) struct Link {
 
 /// What a turn of a linear axis about the ball's point is besides the same turn about the centre of its place, `lever` from
 /// the ball's point to that centre: displacements ω × lever, as (component, mm per rad).
-fn lever_of(machine: &Machine, effect: &Effect, term: &Term, lever: &Vector3<f64>) -> Vec<(usize, f64)> {
-    let bears = |axis| machine.axis(axis).is_some_and(|a| a.side == Side::Workpiece && !a.name.is_rotary());
+fn lever_of(effect: &Effect, term: &Term, lever: &Vector3<f64>) -> Vec<(usize, f64)> {
     match term.place {
         Place::Before(axis) | Place::After(axis)
-            if effect.about == Some(About::Ball) && term.component >= 3 && bears(axis) =>
+            if effect.about == Some(About::Ball) && term.component >= 3 && !axis.is_rotary() =>
         {
             let mut turn = Vector3::zeros();
             turn[term.component - 3] = 1.0;
@@ -396,7 +395,7 @@ impl Model {
             };
             act(term.component, factor);
             let lever = self.slots[slot].centre - machine.reference.ball;
-            for (component, amount) in lever_of(machine, effect, term, &lever) {
+            for (component, amount) in lever_of(effect, term, &lever) {
                 act(component, factor * amount);
             }
         }

@@ -337,7 +337,7 @@ fn missing_effect(d: &Diagnosis, missing: &Missing) -> String {
             let or_else = c.or_else.as_ref().map_or_else(String::new, |other| format!(", or {other}"));
             let what = match (d.proposed(), &c.same_as[..]) {
                 ([first, second], _) => {
-                    format!("{} and {} together: no single effect explains both", first.effect, second.effect)
+                    format!("{} and {} together: no single effect explains it better", first.effect, second.effect)
                 }
                 (_, []) => format!("{} ({}){or_else}", c.name, c.effect),
                 (_, others) => format!("{}{or_else}", one_of(&c.effect, others)),
@@ -349,7 +349,7 @@ fn missing_effect(d: &Diagnosis, missing: &Missing) -> String {
                 _ if c.same_as.is_empty() && c.or_else.is_none() => String::new(),
                 _ => " These touches cannot separate them.".to_owned(),
             };
-            let rest = if c.remains == Some(true) { " Something else is missing as well." } else { "" };
+            let rest = super::not_explained::remains(d);
             let doubt = match doubt {
                 None => String::new(),
                 Some(NameDoubt::Pattern(says)) => {

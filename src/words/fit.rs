@@ -5,7 +5,7 @@ use crate::fit::noise::Noise;
 use crate::fit::null_space::{Combined, Kind, NullDirection};
 use crate::fit::outliers::MOST_SHARE;
 use crate::fit::{Contradiction, Found, NoiseSource, Reason, Remark, VisitSource};
-use crate::model::lever_arm::{From, TurningPoint};
+use crate::model::lever_arm::{From, SURE, TurningPoint};
 use crate::model::temperatures::{NEAR_H, TemperatureGap};
 use crate::units::{mm_from_um, significant, um_from_mm};
 
@@ -32,31 +32,53 @@ pub(crate) fn reason(reason: &Reason) -> String {
     }
 }
 
+/// So near the pivot nothing is that could turn the axis from outside.
+const FARTHEST_OF_A_GEAR_MM: f64 = 50.0;
+
 /// About which point an axis turns, and what that means.
 pub(crate) fn turning_point(point: &TurningPoint) -> String {
     const NEAR_MM: f64 = 20.0;
     let from = if point.from == From::Ball { "ball" } else { "pivot" };
     let letter = |along: usize| ["X", "Y", "Z"][along.min(2)];
+    let sigma = point.sigma_mm.map_or_else(String::new, |s| format!(" ± {s:.0}"));
     let far: Vec<(usize, f64)> = point.off_mm.iter().copied().filter(|(_, mm)| mm.abs() >= NEAR_MM).collect();
     let place = match far[..] {
         [] => format!("near the {from}"),
-        [(2, mm)] => format!("{:.0} mm {} the {from}", mm.abs(), if mm > 0.0 { "above" } else { "below" }),
+        [(2, mm)] => format!("{:.0}{sigma} mm {} the {from}", mm.abs(), if mm > 0.0 { "above" } else { "below" }),
         [(along, mm)] => {
-            format!("{:.0} mm from the {from} to {}{}", mm.abs(), letter(along), if mm > 0.0 { "+" } else { "-" })
+            format!(
+                "{:.0}{sigma} mm from the {from} to {}{}",
+                mm.abs(),
+                letter(along),
+                if mm > 0.0 { "+" } else { "-" }
+            )
         }
         _ => {
             let each: Vec<String> = far.iter().map(|&(along, mm)| format!("{} {mm:+.0} mm", letter(along))).collect();
             format!("at {} from the {from}", each.join(", "))
         }
     };
-    if point.about_itself && far.is_empty() {
-        format!("turn about a point {place}: gear or clamp of {}, not what carries it", point.axis)
-    } else if point.about_itself {
-        format!("turn about a point {place}: what carries {}, not its gear or clamp", point.axis)
-    } else if point.axis.is_rotary() {
-        format!("wobble of {} about a point {place}: the bearing, not run-out", point.axis)
+    let axis = point.axis;
+    let (what, cause) = if point.about_itself {
+        (format!("turn of {axis}"), own_turn(point, far.is_empty()))
+    } else if axis.is_rotary() {
+        (format!("wobble of {axis}"), "the bearing, not run-out".to_owned())
     } else {
-        format!("turn of the carriage of {} about a point {place}: the guideway, not straightness or scale", point.axis)
+        (format!("turn of the carriage of {axis}"), "the guideway, not straightness or scale".to_owned())
+    };
+    format!("{what} about a point {place}: {cause}")
+}
+
+/// What turns an axis further: its gear does so about the pivot, and what carries it about a point elsewhere.
+fn own_turn(point: &TurningPoint, is_near: bool) -> String {
+    let axis = point.axis;
+    let far_mm = point.off_mm.iter().map(|(_, mm)| mm.abs()).fold(0.0, f64::max);
+    match point.sigma_mm {
+        Some(sigma) if !is_near && far_mm > SURE * sigma => format!("what carries {axis}, not its gear or clamp"),
+        Some(sigma) if is_near && SURE * sigma < FARTHEST_OF_A_GEAR_MM => {
+            format!("gear or clamp of {axis}, not what carries it")
+        }
+        _ => format!("gear or clamp of {axis} where that is the pivot, else what carries it"),
     }
 }
 
@@ -481,5 +503,48 @@ fn set_up_word(word: &str) -> &str {
         "SB" => "tilt about Y",
         "SC" => "turn about Z",
         other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::axes::AxisName;
+
+    /// Whether an axis itself turns or what carries it is said where the distance shows it.
+    #[test]
+    fn a_cause_is_said_where_the_distance_shows_it() {
+        let says = |mm: f64, sigma_mm: Option<f64>| {
+            turning_point(&TurningPoint {
+                axis: AxisName::B,
+                about_itself: true,
+                off_mm: vec![(2, mm)],
+                sigma_mm,
+                from: From::Pivot,
+            })
+        };
+        let (gear, ram) = ("gear or clamp of B, not what carries it", "what carries B, not its gear or clamp");
+        let open = "gear or clamp of B where that is the pivot, else what carries it";
+        assert_eq!(says(180.0, Some(20.0)), format!("turn of B about a point 180 ± 20 mm above the pivot: {ram}"));
+        assert_eq!(says(5.0, Some(10.0)), format!("turn of B about a point near the pivot: {gear}"));
+        for (mm, sigma_mm) in [(27.0, Some(121.0)), (5.0, Some(60.0)), (-73.0, Some(122.0)), (180.0, None)] {
+            assert!(says(mm, sigma_mm).ends_with(open), "{}", says(mm, sigma_mm));
+        }
+        assert_eq!(says(27.0, Some(121.0)), format!("turn of B about a point 27 ± 121 mm above the pivot: {open}"));
+    }
+
+    #[test]
+    fn a_wobble_has_its_point_with_its_uncertainty() {
+        let mut point = TurningPoint {
+            axis: AxisName::C,
+            about_itself: false,
+            off_mm: vec![(2, -180.0)],
+            sigma_mm: Some(12.0),
+            from: From::Ball,
+        };
+        let known = "wobble of C about a point 180 ± 12 mm below the ball: the bearing, not run-out";
+        assert_eq!(turning_point(&point), known);
+        point.sigma_mm = None;
+        assert_eq!(turning_point(&point), known.replace(" ± 12", ""));
     }
 }

@@ -174,7 +174,7 @@ fn falls(m: &Material, c: &Candidate) -> String {
     };
     let sizes = if sizes.is_empty() { String::new() } else { format!(" Its size: {}.", sizes.join("; ")) };
     let moves = moves.map_or_else(String::new, |most| format!(" {they_move} single touches by up to {}.", um(most)));
-    let rest = if c.remains == Some(true) { " Something else is missing as well." } else { "" };
+    let rest = super::not_explained::remains(d);
     let (of, now_um, then_um) = match &d.all_touches {
         None => (String::new(), d.rms_um, m.proposed.map_or(c.rms_after_um, |fit| fit.outcome.rms_um)),
         Some(all) => {

@@ -105,6 +105,51 @@ fn a_pitching_carriage_says_where_it_turns() {
     assert!((value("EBX_x") / value("EBX") * 1e3 - 180.0).abs() < 20.0, "{} {}", value("EBX_x"), value("EBX"));
 }
 
+/// X of the trunnion is a carriage in the head. Its guideway is bowed upwards, so that it sinks by 15 µm at 150 mm and pitches by the
+/// slope, about bearings 300 mm below the ball.
+#[test]
+fn a_bowed_guideway_says_where_its_carriage_turns() {
+    let bench = Bench::of("trunnion", true);
+    let about = bench.machine.reference.ball - forward::V::z() * 300.0;
+    let bow = move |at: &At, wrong: &mut forward::Wrong| {
+        let u = at.q[0] / 150.0;
+        // the slope is dz/dx = -2 * 15 µm * u / 150 mm, and what falls towards +X turns about +Y
+        let (shift, turn) = (forward::V::z() * (-0.015 * u * u), forward::V::y() * (0.030 * u / 150.0));
+        wrong.after[0].push(forward::Slip { shift, turn, about });
+    };
+    let d = judge::diagnosis(&bench, &[&bow], 5);
+    let first = &d.candidates[0];
+    assert_eq!(first.effect, "carriage-sag-x", "{}", d.says);
+    let says = &first.says;
+    assert!(says.contains("turn of the carriage of X about a point ") && says.contains(" mm below the ball"), "{says}");
+    let arm = first.parameters.iter().find(|p| p.name == "arm_carriage_sag_x").unwrap();
+    assert!((arm.value + 300.0).abs() < 40.0, "{}", arm.value);
+}
+
+/// The weight of the head turns it by 80 µrad at B = 90: in its gear, or with its ram about a point 300 mm above the pivot.
+#[test]
+fn a_head_turned_by_its_weight_says_whether_its_ram_turns_too() {
+    let bench = Bench::of("swivel-head", true);
+    let pivot = bench.machine.reference.pivot;
+    for (above_mm, says) in
+        [(0.0, "gear or clamp of B, not what carries it"), (300.0, "what carries B, not its gear or clamp")]
+    {
+        let about = pivot + forward::V::z() * above_mm;
+        let lean = move |at: &At, wrong: &mut forward::Wrong| {
+            wrong.before[4].push(forward::Slip::turn(forward::V::y() * (80e-6 * at.q[4].sin()), about));
+        };
+        let d = judge::diagnosis(&bench, &[&lean], 5);
+        let group = judge::groups(&d).swap_remove(0);
+        assert!(group.contains(&"head-tilt".to_owned()), "{above_mm}: {}", d.says);
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let base = bench.ordinary(&mut rng);
+        let touches = bench.measure(&[&*base, &lean], 1.0, 0.0, true, &mut rng);
+        let (fit, _) = judge::fit(&bench, &touches, &["head-tilt".to_owned()]);
+        let [point] = &fit.outcome.turns_about[..] else { panic!("{above_mm}: {:?}", fit.outcome.turns_about) };
+        assert!(point.says.ends_with(says), "{above_mm}: {}", point.says);
+    }
+}
+
 /// One index position of `full` has another feed. A control that stores 12 ms late moves it as a whole: its touches are excluded, and
 /// put back where the question is asked again.
 #[test]

@@ -74,7 +74,7 @@ fn two_effects_that_explain_the_touches_together_are_named_together() {
     assert_eq!(second["together_with"], first["effect"]);
     // and the message states both names and the error that is left
     let says = d["says"].as_str().unwrap();
-    let both = "scale-y and backlash-a together: no single effect explains both";
+    let both = "scale-y and backlash-a together: no single effect explains it better";
     for part in [both, "With both the error", &format!("{before:.2}"), &format!("{after:.2} µm")] {
         assert!(says.contains(part), "{part:?} is not in {says:?}");
     }

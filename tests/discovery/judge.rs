@@ -37,7 +37,7 @@ pub struct Outcome {
     /// The group's first name is right.
     pub by_name: bool,
     pub groups: Vec<Vec<String>>,
-    /// Over the noise, with the first right or first named effect in the model.
+    /// A right name is proposed, or one of those that the answer says it cannot be told from.
     pub proposed: bool,
     /// Two effects are named together, where one fault was planted.
     pub pair: bool,
@@ -236,7 +236,7 @@ fn one(
         verdict: d.verdict.as_str().to_owned(),
         rank: groups.iter().position(|g| g.iter().any(right)).map(|i| i + 1),
         by_name: groups.first().is_some_and(|g| right(&g[0])),
-        proposed: d.candidates.first().is_some_and(|c| c.proposed),
+        proposed: d.proposed().iter().any(|c| right(&c.effect) || c.same_as.iter().any(right)),
         pair: d.candidates.first().is_some_and(|c| c.together_with.is_some()),
         groups,
     }
@@ -296,18 +296,22 @@ pub fn mistake(bench: &Bench, mistake: &Mistake, seed: u64) -> Led {
         let gross = d.mistake().is_some() && d.gross.first().is_some_and(|g| expects.contains(&g.hypothesis.as_str()));
         // a size that no machine has: the verdict names the first
         let too_large = d.oversized.first().is_some_and(|o| expects.contains(&o.effect.as_str()));
-        result.led |= named || gross || too_large;
+        // a drift is the room's only where the answer says that the log has no temperatures
+        result.led |= named && (mistake.with_temperatures.is_none() || result.gave_temperatures) || gross || too_large;
         let cannot_be_tested = |id: &str| d.needs_temperature.iter().any(|e| e == id);
-        let asks_for_temperatures = expects.iter().any(|id| cannot_be_tested(id) && d.says.contains(id));
+        // beside the verdict, or beside the name of a drift
+        let or_the_room = d.candidates.first().is_some_and(|c| c.proposed && c.or_else.is_some());
+        let asks_for_temperatures =
+            expects.iter().any(|id| cannot_be_tested(id) && (or_the_room || d.says.contains(id)));
         let first_name = first.map(|g| g[0].clone());
         result.said.push(format!("{}: {}", d.verdict.as_str(), first_name.as_deref().unwrap_or("no effect")));
         match (first_name.filter(|id| id != "sign-or-axis-swap"), &mistake.with_temperatures) {
-            (Some(id), _) => more.push(id),
-            (None, Some((make, then))) if asks_for_temperatures => {
+            (_, Some((make, then))) if asks_for_temperatures && !result.gave_temperatures => {
                 touches = make(bench, &base, &mut same_draws).unwrap();
                 // the second step has to name the cause
                 (result.led, result.gave_temperatures, expects) = (false, true, then);
             }
+            (Some(id), _) => more.push(id),
             _ => break,
         }
     }

@@ -202,12 +202,12 @@ fn what_is_written_of_a_place_depends_on_the_side() {
 fn a_carriage_sinks_and_leans_outwards_on_both_sides() {
     let (head, table) = (head(), table());
     let sag = [("carriage_sag_X", 4.0), ("arm_carriage_sag_x", 0.0)];
-    // Head, X = 150, u = +150. It leans about the moving origin of R, 202.684 mm above the ball: what hangs below goes inwards by
-    // 202.684 * 13.333 333e-6 = 0.002 702 453, to -X. The face +X is met that much later in the coordinate: +0.002 702 453.
-    check(&head, on(&head, [142.0, 0.0, -202.684], X), "carriage-sag-x", &sag, "", 0.002_702_453);
-    // With the bearing at the ball's height nothing goes inwards.
-    let at_ball = [("carriage_sag_X", 4.0), ("arm_carriage_sag_x", -202.684)];
-    check(&head, on(&head, [142.0, 0.0, -202.684], X), "carriage-sag-x", &at_ball, "", 0.0);
+    // Head, X = 150, u = +150. It leans about the ball: nothing goes sideways.
+    check(&head, on(&head, [142.0, 0.0, -202.684], X), "carriage-sag-x", &sag, "", 0.0);
+    // With the bearing 202.684 mm above the ball what hangs below it goes inwards by 202.684 * 13.333 333e-6 = 0.002 702 453, to -X.
+    // The face +X is met that much later in the coordinate: +0.002 702 453.
+    let above = [("carriage_sag_X", 4.0), ("arm_carriage_sag_x", 202.684)];
+    check(&head, on(&head, [142.0, 0.0, -202.684], X), "carriage-sag-x", &above, "", 0.002_702_453);
     // The ball itself has sunk by 1 µm: the top is met 1 µm early, and for its distance of 8 mm from the ball's height at zero
     // (Z = 8) nothing more, because the turn moves it sideways only.
     check(&head, on(&head, [150.0, 0.0, -202.684], Z), "carriage-sag-x", &sag, "", 0.001);
@@ -218,7 +218,8 @@ fn a_carriage_sinks_and_leans_outwards_on_both_sides() {
     // Y of the table in the same way.
     let sag_y = [("carriage_sag_Y", 4.0), ("arm_carriage_sag_y", 0.0)];
     check(&table, on(&table, [0.0, 150.0, -202.684], Z), "carriage-sag-y", &sag_y, "", 0.001);
-    check(&head, on(&head, [0.0, 142.0, -202.684], Y), "carriage-sag-y", &sag_y, "", 0.002_702_453);
+    let above_y = [("carriage_sag_Y", 4.0), ("arm_carriage_sag_y", 202.684)];
+    check(&head, on(&head, [0.0, 142.0, -202.684], Y), "carriage-sag-y", &above_y, "", 0.002_702_453);
 }
 
 #[test]
@@ -288,16 +289,15 @@ fn a_pitch_of_a_guideway_acts_on_what_its_carriage_bears() {
     let top = |machine: &Machine| on(machine, [150.0, 0.0, -202.684], Z);
     let side = |machine: &Machine| on(machine, [142.0, 0.0, -202.684], X);
     // A table's carriage: about the ball's place at zero. The block is 150 mm from there to +X and sinks by 150 * 10e-6 = 0.0015. A
-    // head's carriage: about the origin of R that goes along with it, 202.684 mm above the ball: it goes sideways, which the top does
-    // not see.
+    // head's carriage takes that place along: the ball itself stays where it is.
     let level = [("EBX", 20.0), ("EBX_x", 0.0), ("EBX_z", 0.0)];
     check(&table, top(&table), "angular-bx", &level, "", -0.0015);
     check(&head, top(&head), "angular-bx", &level, "", 0.0);
-    // about a point 180 mm below the ball: what is at the ball's height goes 180 * 10e-6 = 0.0018 to +X. The point is 180 mm below
-    // where the turn of the table is stated: EBX_x is 20e-6 * 180 mm = 3.6 µm at 300 mm. It is 382.684 mm below the origin of R:
-    // 20e-6 * 382.684 = 7.653 68 µm. The face +X of the table comes towards the ball; the head's ball is ahead of its coordinate.
-    check(&table, side(&table), "angular-bx", &[("EBX", 20.0), ("EBX_x", 3.6), ("EBX_z", 0.0)], "", 0.0018);
-    check(&head, side(&head), "angular-bx", &[("EBX", 20.0), ("EBX_x", 7.653_68), ("EBX_z", 0.0)], "", -0.0018);
+    // about a point 180 mm below the ball: what is at the ball's height goes 180 * 10e-6 = 0.0018 to +X. EBX_x is 20e-6 * 180 mm =
+    // 3.6 µm at 300 mm. The face +X of the table comes towards the ball; the head's ball is ahead of its coordinate.
+    let below = [("EBX", 20.0), ("EBX_x", 3.6), ("EBX_z", 0.0)];
+    check(&table, side(&table), "angular-bx", &below, "", 0.0018);
+    check(&head, side(&head), "angular-bx", &below, "", -0.0018);
 }
 
 /// 40 µrad of play: an axis that is clamped at +30 degrees has fallen 20 µrad further, at -30 degrees 20 µrad the other way.

@@ -157,8 +157,8 @@ fn pair_in(pair: &str, machine: &Machine) -> Result<(usize, AxisName), Refusal> 
     Ok((axis_in(dof)?.index(), linear_in(axis, machine)?))
 }
 
-/// A lean of a carriage that bears the workpiece, such that the place of the ball's centre at zero stays where it is: the
-/// chain leans it about the origin of R, and a shift brings it back.
+/// A lean of a carriage such that the place of the ball's centre at zero stays where it is: the chain leans it about the origin of R
+/// that goes along with it, and a shift brings it back.
 fn at_the_ball(mut parameter: Parameter, machine: &Machine) -> Parameter {
     if let Role::Amount(acts) = &mut parameter.role
         && let Some(&(target, shape, factor)) = acts.first()
@@ -169,10 +169,10 @@ fn at_the_ball(mut parameter: Parameter, machine: &Machine) -> Parameter {
 }
 
 /// The shifts, mm per rad, that bring the place of the ball's centre at zero back where a lean has moved it; none where the
-/// axis is no linear one that bears the workpiece (a rotary axis leans on its own line).
+/// axis is no linear one (a rotary axis leans on its own line).
 pub fn back_to_the_ball(target: Target, machine: &Machine) -> Vec<(Target, f64)> {
     let Target::Axis { axis, after, dof } = target else { return Vec::new() };
-    if dof < 3 || axis.is_rotary() || !axis_here(axis, machine).is_ok_and(|a| a.side == Side::Workpiece) {
+    if dof < 3 || axis.is_rotary() {
         return Vec::new();
     }
     let ball = &machine.reference.ball;
@@ -184,7 +184,12 @@ pub fn back_to_the_ball(target: Target, machine: &Machine) -> Vec<(Target, f64)>
 
 /// Turns that act about a point at `arm_…` mm along a direction (0, 1, 2: x, y, z): each point of what is turned moves less, or more,
 /// by the turn times that distance.
-pub(super) fn about_a_point(mut turns: Vec<Parameter>, id: &str, along: usize, settings: Settings<'_>) -> Vec<Parameter> {
+pub(super) fn about_a_point(
+    mut turns: Vec<Parameter>,
+    id: &str,
+    along: usize,
+    settings: Settings<'_>,
+) -> Vec<Parameter> {
     let name = format!("arm_{}", id.replace('-', "_"));
     let arm = settings(&name).unwrap_or(0.0);
     for turn in &mut turns {

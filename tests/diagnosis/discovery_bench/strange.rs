@@ -3,6 +3,7 @@
 use super::find;
 use super::plant::{self, Bench};
 use axiscal::axes::AxisName;
+use axiscal::diagnose::verdict::Missing;
 use axiscal::diagnose::{Options, Verdict};
 use axiscal::log::Touch;
 use axiscal::model::catalogue::Catalogue;
@@ -34,7 +35,8 @@ pub struct Seen {
     pub depends: Vec<String>,
     pub rejected: usize,
     pub proposed: Option<String>,
-    /// Said as the one answer: proposed, told from all others, and no shape is better. Of these kinds every name is wrong.
+    /// Said as the whole answer: proposed, told from all others, no shape is better, and nothing else is missing. Of these kinds every
+    /// name is wrong, or a part of what acts.
     pub bare: bool,
     /// Reduced RMS with the sketched formula, where the kind has one.
     pub sketched: Option<f64>,
@@ -63,7 +65,8 @@ fn one(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> Seen {
     };
     let data = find::data(&bench.machine, &bench.plans, &touches);
     let (fit, settings) = find::fit(&bench.machine, &catalogue, data.clone(), &[], None);
-    let options = Options { at_most: 3, refit: false, power: false, planned: None };
+    // as `diagnose` asks, refits included
+    let options = Options { at_most: 3, refit: true, power: false, planned: None };
     let d = find::look(&bench.machine, &catalogue, &fit, &settings, &options);
     let mut more: Vec<String> = Vec::new();
     let mut last = d.clone();
@@ -82,8 +85,8 @@ fn one(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> Seen {
         depends: d.depends.iter().map(|w| w.by.clone()).collect(),
         rejected: d.outliers.len(),
         proposed: d.candidates.first().filter(|c| c.proposed).map(|c| c.effect.clone()),
-        bare: d.candidates.first().is_some_and(|c| c.proposed && c.same_as.is_empty())
-            && !d.says.contains("the name may be wrong"),
+        bare: d.verdict == Verdict::MissingEffect(Missing::Effect(None))
+            && d.candidates.first().is_some_and(|c| c.proposed && c.same_as.is_empty() && c.remains != Some(true)),
         sketched: if KINDS[kind].2 { find::sketched(&bench.machine, &catalogue, &fit, &settings) } else { None },
     }
 }
