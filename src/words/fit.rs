@@ -74,11 +74,13 @@ fn own_turn(point: &TurningPoint, is_near: bool) -> String {
     let axis = point.axis;
     let far_mm = point.off_mm.iter().map(|(_, mm)| mm.abs()).fold(0.0, f64::max);
     match point.sigma_mm {
-        Some(sigma) if !is_near && far_mm > SURE * sigma => format!("what carries {axis}, not its gear or clamp"),
-        Some(sigma) if is_near && SURE * sigma < FARTHEST_OF_A_GEAR_MM => {
-            format!("gear or clamp of {axis}, not what carries it")
+        Some(sigma) if !is_near && far_mm > SURE * sigma => {
+            format!("what carries {axis} gives way, not its gear or clamp")
         }
-        _ => format!("gear or clamp of {axis} where that is the pivot, else what carries it"),
+        Some(sigma) if is_near && SURE * sigma < FARTHEST_OF_A_GEAR_MM => {
+            format!("the gear or clamp of {axis} gives way, not what carries it")
+        }
+        _ => format!("the gear or clamp of {axis} gives way, or what carries it"),
     }
 }
 
@@ -523,8 +525,9 @@ mod tests {
                 from: From::Pivot,
             })
         };
-        let (gear, ram) = ("gear or clamp of B, not what carries it", "what carries B, not its gear or clamp");
-        let open = "gear or clamp of B where that is the pivot, else what carries it";
+        let gear = "the gear or clamp of B gives way, not what carries it";
+        let ram = "what carries B gives way, not its gear or clamp";
+        let open = "the gear or clamp of B gives way, or what carries it";
         assert_eq!(says(180.0, Some(20.0)), format!("turn of B about a point 180 ± 20 mm above the pivot: {ram}"));
         assert_eq!(says(5.0, Some(10.0)), format!("turn of B about a point near the pivot: {gear}"));
         for (mm, sigma_mm) in [(27.0, Some(121.0)), (5.0, Some(60.0)), (-73.0, Some(122.0)), (180.0, None)] {

@@ -18,7 +18,7 @@ use crate::units::mm_from_um;
 use nalgebra::Vector3;
 
 /// Rounds of choosing, proving and leaving out what cannot be reached.
-const MOST_ROUNDS: usize = 5;
+const MOST_ROUNDS: usize = 8;
 
 /// The program uses at least this share of its time, at most this much more.
 const USED: [f64; 2] = [0.9, 1.02];
