@@ -165,6 +165,10 @@ impl Findings<'_> {
     fn name_doubt(&self) -> Option<NameDoubt> {
         let on = self.beside.better.as_ref()?;
         let pattern = self.depends.iter().find(|w| w.on == *on)?;
+        // a pattern that explains less is not better: it only has fewer parameters
+        if self.candidates.first().is_some_and(|c| c.share >= pattern.share) {
+            return None;
+        }
         // where the pattern depends on the effect's own variable, only what it explains beyond the effect counts
         let own = self.candidates.first().filter(|c| words::speaks_of(self.subject, &c.effect, &pattern.on));
         match own {
