@@ -64,6 +64,24 @@ fn coarse_digits_do_not_hide_an_effect() {
     assert!(found.candidates[0].proposed, "{}", found.says);
 }
 
+/// The displacement of one single index position is in the place of the block: its residuals say nothing of the scatter, and the declared
+/// value is used. Several positions say something.
+#[test]
+fn the_declared_scatter_is_used_where_the_residuals_say_nothing() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "head");
+    let text = "seed = 4\n[noise]\ntouch_um = 1.0\nvisit_um = 0.5\n";
+    let touches = touch(&machine, &plan, &scenario(&machine, text), None);
+    let all = fitted(&machine, &plan, &touches, &settings(&machine, &[]));
+    assert!(all.outcome.visit_shown_um.is_some_and(|um| um > 0.0));
+    let first = plan.touches[0].pose;
+    let of_one: Vec<Touch> =
+        touches.iter().zip(&plan.touches).filter(|(_, p)| p.pose == first).map(|(t, _)| t.clone()).collect();
+    assert!(of_one.len() > 4);
+    let one = fitted(&machine, &plan, &of_one, &settings(&machine, &[]));
+    assert_eq!(one.outcome.visit_shown_um, None);
+}
+
 #[test]
 fn a_value_that_holds_another_effect_says_so() {
     let machine = machine("trunnion");
