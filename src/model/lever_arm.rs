@@ -102,8 +102,8 @@ pub enum From {
 pub const SURE: f64 = 3.0;
 
 /// Where the point lies about which an effect turns its axis; `value`: of each of its parameters, by its place, and its standard
-/// uncertainty, in its unit (infinite: not known). None where the effect has no such point; where displacements beside the turn say where
-/// the point is, also where it may not turn at all.
+/// uncertainty, in its unit (infinite: not known). None where the effect has no such point. Where two displacements say
+/// where it lies, also None if the axis may not turn at all.
 #[must_use]
 pub fn turning_point(
     machine: &Machine,
@@ -184,32 +184,14 @@ mod tests {
             let is_arm = |i: usize| effect.parameters[i].name.starts_with("arm_");
             turning_point(&machine, effect, |i| Some((if is_arm(i) { arm_mm } else { 0.0 }, 9.0)))
         };
+        let point = |axis, about_itself, off: (usize, f64), from| {
+            Some(TurningPoint { axis, about_itself, off_mm: vec![off], sigma_mm: Some(9.0), from })
+        };
         // C of the table: its arm counts from the height of the ball
-        let below = TurningPoint {
-            axis: AxisName::C,
-            about_itself: false,
-            off_mm: vec![(2, -180.0)],
-            sigma_mm: Some(9.0),
-            from: From::Ball,
-        };
-        assert_eq!(at("swivel-head", "tilt-c-1", -180.0), Some(below));
-        let aside = TurningPoint {
-            axis: AxisName::B,
-            about_itself: false,
-            off_mm: vec![(1, 90.0)],
-            sigma_mm: Some(9.0),
-            from: From::Pivot,
-        };
-        assert_eq!(at("swivel-head", "tilt-b-2", 90.0), Some(aside));
+        assert_eq!(at("swivel-head", "tilt-c-1", -180.0), point(AxisName::C, false, (2, -180.0), From::Ball));
+        assert_eq!(at("swivel-head", "tilt-b-2", 90.0), point(AxisName::B, false, (1, 90.0), From::Pivot));
         // the weight of the head turns B about its own direction, but with what carries it
-        let above = TurningPoint {
-            axis: AxisName::B,
-            about_itself: true,
-            off_mm: vec![(2, 150.0)],
-            sigma_mm: Some(9.0),
-            from: From::Pivot,
-        };
-        assert_eq!(at("swivel-head", "head-tilt", 150.0), Some(above));
+        assert_eq!(at("swivel-head", "head-tilt", 150.0), point(AxisName::B, true, (2, 150.0), From::Pivot));
         // X carries the spindle: its arm counts from the ball as that of a table does
         for machine in ["trunnion", "swivel-head"] {
             let above = at(machine, "carriage-sag-x", 70.0).unwrap();

@@ -32,7 +32,7 @@ pub(crate) fn reason(reason: &Reason) -> String {
     }
 }
 
-/// So near the pivot nothing is that could turn the axis from outside.
+/// What carries the axis does not turn about a point as near its pivot as this.
 const FARTHEST_OF_A_GEAR_MM: f64 = 50.0;
 
 /// About which point an axis turns, and what that means.

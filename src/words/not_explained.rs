@@ -91,7 +91,7 @@ pub(super) fn remains(d: &Diagnosis) -> String {
     match d.proposed() {
         [c] if c.remains == Some(true) => {
             let part = looks_like(&candidate_names(d), c.share);
-            format!(" Something else is missing as well: {}.", part)
+            format!(" Something else is missing as well: {part}.")
         }
         [first, _] if first.remains == Some(true) => " Something else is missing as well.".to_owned(),
         _ => String::new(),

@@ -37,7 +37,7 @@ pub struct Outcome {
     /// The group's first name is right.
     pub by_name: bool,
     pub groups: Vec<Vec<String>>,
-    /// A right name is proposed, or one of those that the answer says it cannot be told from.
+    /// A right name is proposed, or one that the answer says cannot be separated from a proposed one.
     pub proposed: bool,
     /// Two effects are named together, where one fault was planted.
     pub pair: bool,

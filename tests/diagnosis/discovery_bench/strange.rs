@@ -35,7 +35,7 @@ pub struct Seen {
     pub depends: Vec<String>,
     pub rejected: usize,
     pub proposed: Option<String>,
-    /// Said as the whole answer: proposed, told from all others, no shape is better, and nothing else is missing. Of these kinds every
+    /// Said as the whole answer: proposed, separated from all others, no shape is better, and nothing else is missing. Of these kinds every
     /// name is wrong, or a part of what acts.
     pub bare: bool,
     /// Reduced RMS with the sketched formula, where the kind has one.
