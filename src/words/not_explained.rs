@@ -51,7 +51,7 @@ pub(super) fn not_explained(d: &Diagnosis, unexplained: &Unexplained, fit: &Fit)
                 true => "A pattern that no listed effect explains fits clearly better",
                 false => "Several patterns that no listed effect explains fit clearly better together",
             };
-            let part = capital(&looks_like(&candidate_names(d), d.candidates.first().map_or(0.0, |c| c.share)));
+            let part = looks_like("it", &candidate_names(d), d.candidates.first().map_or(0.0, |c| c.share));
             format!("{missing} No listed effect explains all of it. {part}. {patterns}.{cause}")
         }
         NotNamed::NotConfirmed => format!(
@@ -90,8 +90,8 @@ fn weak_pattern(depends: &str) -> String {
 pub(super) fn remains(d: &Diagnosis) -> String {
     match d.proposed() {
         [c] if c.remains == Some(true) => {
-            let part = looks_like(&candidate_names(d), c.share);
-            format!(" Something else is missing as well: {part}.")
+            let part = looks_like("the residual", &candidate_names(d), c.share);
+            format!(" {part}: something else is missing as well.")
         }
         [first, _] if first.remains == Some(true) => " Something else is missing as well.".to_owned(),
         _ => String::new(),
@@ -99,12 +99,12 @@ pub(super) fn remains(d: &Diagnosis) -> String {
 }
 
 /// How much of the residual an effect explains that does not explain all of it.
-fn looks_like(names: &str, share: f64) -> String {
+fn looks_like(what: &str, names: &str, share: f64) -> String {
     let percent = (100.0 * share).round();
     if percent >= 100.0 {
-        format!("nearly all of it looks like {names}")
+        format!("Nearly all of {what} looks like {names}")
     } else {
-        format!("a part of it looks like {names} ({percent:.0} %)")
+        format!("A part of {what} looks like {names} ({percent:.0} %)")
     }
 }
 
@@ -116,7 +116,7 @@ mod tests {
     fn a_pattern_says_what_it_depends_on_and_a_part_is_less_than_all() {
         assert_eq!(weak_pattern(""), "A weak pattern is left that depends on nothing that these touches show");
         assert_eq!(weak_pattern("40 % depends on C"), "A weak pattern is left: 40 % depends on C");
-        assert_eq!(looks_like("radial-a-2", 0.998), "nearly all of it looks like radial-a-2");
-        assert_eq!(looks_like("radial-a-2", 0.994), "a part of it looks like radial-a-2 (99 %)");
+        assert_eq!(looks_like("it", "radial-a-2", 0.998), "Nearly all of it looks like radial-a-2");
+        assert_eq!(looks_like("it", "radial-a-2", 0.994), "A part of it looks like radial-a-2 (99 %)");
     }
 }
