@@ -3,7 +3,7 @@
 import { copyFileSync, existsSync, mkdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { after, number, openView, opened, text, told } from "./workbench.mjs";
-import { axiscal, equal, holds, picture, watched, workbench } from "./tools.mjs";
+import { axiscal, equal, holds, measured, picture, watched, workbench } from "./tools.mjs";
 
 const PLOT = "#residuals .plot";
 
@@ -102,6 +102,30 @@ async function marksFall(t) {
   await page.click("#multiples [data-variable=B]");
   const shown = await page.evaluate((plot) => { const p = document.querySelector(plot); return [p.dataset.variable, p.dataset.ghosts, p.data.filter((d) => d.name === "before").length > 0]; }, PLOT);
   equal(shown, ["B", "true", true], "the old marks against another variable");
+}
+
+/** A state that is read a second time while the page opens changes nothing: the marks of before are kept at the first step. */
+async function readTwice(t) {
+  const folder = measured(t.dir, "read-twice");
+  const address = await workbench(join(folder, "study.toml"), t.atEnd);
+  const [page, seen] = await watched(t.context);
+  // the first answer with the touches waits for the second question
+  const held = [];
+  await page.route("**/api/inputs", async (route) => {
+    held.push(route);
+    if (held.length === 1) return page.evaluate(async () => { window.again = (await import("/assets/talk.js")).refresh(); });
+    await held[0].continue();
+    await page.waitForSelector("body[data-version]");
+    return route.continue();
+  });
+  await page.goto(address);
+  await page.waitForSelector("body[data-version]");
+  await page.evaluate(async () => { await window.again; });
+  equal(held.length, 2, "times that the touches are read");
+  await told(page);
+  await after(page, () => page.click("[data-switch=squareness-xy]"));
+  equal(await page.getAttribute(PLOT, "data-ghosts"), "true", "the marks of before stay as ghosts");
+  equal(seen.errors, [], "errors in the console");
 }
 
 /** The slider goes through the index positions, and every touch belongs to one. */
@@ -268,6 +292,7 @@ export const oneScreenCases = [
   ["workbench_where_it_fails", whereItFails],
   ["workbench_small_curves", smallCurves],
   ["workbench_marks_fall", marksFall],
+  ["workbench_read_twice_while_opening", readTwice],
   ["workbench_machine_in_3d", machineIn3d],
   ["workbench_hostile_names", hostileNames],
   ["workbench_ten_clicks", tenClicks],

@@ -12,13 +12,17 @@ const tell = (what, ...words) => listeners[what].forEach((listener) => listener(
 
 /** Puts a new state in the place of the old one; an older one that arrives late is dropped. */
 async function put(live) {
+  const late = () => state.live && live.version < state.live.version;
+  const known = () => state.inputs?.inputs === live.inputs;
   await released();
-  if (state.live && live.version < state.live.version) return;
-  if (!state.inputs || state.inputs.inputs !== live.inputs) {
+  if (late()) return;
+  if (!known()) {
     const inputs = await ask("/api/inputs");
     await released();
     if (inputs.inputs !== live.inputs) return refresh();
-    state.inputs = inputs;
+    // two states that came together both ask; the touches that the plots hold are not exchanged for the same ones
+    if (late()) return;
+    if (!known()) state.inputs = inputs;
   }
   const first = !state.live;
   const newer = first || live.version !== state.live.version;
