@@ -485,9 +485,12 @@ fn settings_with(subject: Subject, more: &[&str]) -> Settings {
     settings
 }
 
-/// Does a fit still miss something, by the tests of the first step?
+/// Does a fit still miss something, by the tests of the first step, or because touches that it does not use lie together?
 fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
     let features = Arc::new(features::features(fit, machine));
+    if clustered_rejections::gathered(fit, &features).is_some() {
+        return true;
+    }
     let found = Regression::new(fit, machine, catalogue, &features);
     let question = found.evidence.question();
     if found.search().leader().is_some() {

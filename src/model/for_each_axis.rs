@@ -1,6 +1,7 @@
-//! A row of effects with `axes` stands for one row of each axis: letters in braces follow the axis ([`AxisName::fill_in`]).
+//! A row of effects with `axes` stands for one row of each axis: letters in braces follow the axis ([`AxisName::fill_in`]). A row with
+//! `{place}` in a formula stands for one row of each side of the chain.
 
-use super::as_written::{EffectAsWritten, Placed, Typical};
+use super::as_written::{EffectAsWritten, Placed, SideAsWritten, Typical};
 use super::lever_arm::with_arm;
 use crate::axes::AxisName;
 
@@ -13,16 +14,38 @@ pub(super) fn expand(
     for together in rows.chunk_by(|_, next| next.with_previous) {
         let letters = together.first().map(|row| axes(&row.axes)).unwrap_or_default();
         if letters.is_empty() {
-            out.extend(together.iter().cloned().map(with_arm));
+            out.extend(together.iter().cloned());
         }
         for (number, axis) in letters.into_iter().enumerate() {
-            out.extend(together.iter().map(|row| with_arm(row.for_axis(axis, number))));
+            out.extend(together.iter().map(|row| row.for_axis(axis, number)));
         }
     }
-    out
+    out.into_iter().flat_map(EffectAsWritten::for_sides).map(with_arm).collect()
 }
 
+/// Where the carriage of the row's axis stands on its guideway, mm or rad. What bears the tool stands at its coordinate; what bears the
+/// workpiece goes the other way and stands at minus its coordinate.
+const PLACE: &str = "{place}";
+
 impl EffectAsWritten {
+    fn for_sides(self) -> Vec<Self> {
+        if !self.terms.iter().any(|term| term.formula.get_ref().contains(PLACE)) {
+            return vec![self];
+        }
+        let on = |(side, sign): (SideAsWritten, &str)| {
+            let mut row = self.clone();
+            row.side = Some(side);
+            let place = format!("({sign}{})", row.at.get_ref());
+            for term in &mut row.terms {
+                let formula = term.formula.get_ref().replace(PLACE, &place);
+                *term.formula.get_mut() = formula;
+            }
+            row
+        };
+        let sides = [(SideAsWritten::Tool, ""), (SideAsWritten::Workpiece, "-")];
+        sides.into_iter().filter(|(side, _)| self.side.is_none_or(|own| own == *side)).map(on).collect()
+    }
+
     fn for_axis(&self, axis: AxisName, number: usize) -> Self {
         let mut row = self.clone();
         let Self { name, says, look, mends, too_large, .. } = &mut row;
@@ -48,6 +71,7 @@ impl EffectAsWritten {
 #[cfg(test)]
 mod tests {
     use crate::diag::source;
+    use crate::machine::Side;
     use crate::model::catalogue::Catalogue;
 
     #[test]
@@ -78,5 +102,14 @@ mod tests {
         assert_eq!(found, expected);
         let wrong = Catalogue::default().add_file(&source("my.toml", text.replace("\"C\"]", "\"Q\"]"))).unwrap_err();
         assert_eq!(wrong.0[0].code, "effects::axis");
+    }
+    #[test]
+    fn a_place_on_a_guideway_has_the_sign_of_its_side() {
+        let text = "[[effect]]\nid = \"p\"\nat = \"X\"\nterms = [{ parameter = \"q\", unit = \"um\", dof = \"dz\", formula = \
+                    \"{place} + X\" }]\n";
+        let mut catalogue = Catalogue::default();
+        catalogue.add_file(&source("my.toml", text.to_owned())).unwrap();
+        let found: Vec<_> = catalogue.iter().map(|e| (e.side, e.terms[0].formula.text())).collect();
+        assert_eq!(found, [(Some(Side::Tool), "(X) + X"), (Some(Side::Workpiece), "(-X) + X")]);
     }
 }

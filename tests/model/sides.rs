@@ -337,6 +337,48 @@ fn the_pretravel_of_a_direction_turns_with_the_probe() {
     check(&table, of([0.0, -1.0, 0.0]), "pretravel-directions", &[("pretravel_yp", 4.0)], "", -0.004);
 }
 
+/// The control counts an axis backwards, or two for each other: the axis stands at -q where q is shown. Faces are touched along their
+/// normals, close to where it makes no difference: elsewhere the ball would meet nothing.
+#[test]
+fn a_control_with_a_wrong_sign_or_two_swapped_axes() {
+    const SWAP: &str = "sign-or-axis-swap";
+    let (head, table) = (head(), table());
+    for machine in [&head, &table] {
+        // C: shown at 0.1, it stands at -0.1 degrees. Seen from the table the ball comes 0.2 degrees askew: in its frame at y =
+        // 50 sin 0.2 + (8 + t) cos 0.2, which is 8 on the face: t = -0.174 483.
+        let aside = Touch::of_c([50.0, 0.0, -202.684], Y, 0.1);
+        check(machine, aside, SWAP, &[("flip_C", 1.0)], "", -0.174_484_895);
+        // X: the face +X looks to (0.5, 0.866) at C = 60, and the ball at 8 mm from it would be met at X = 0.5 * 0.4 = 0.2. Its path
+        // t has X = 0.2 + 0.5 t where it is shown, minus that where it is: -0.5 (0.2 + 0.5 t) + 0.75 t = 0.5 * 0.2, t = 0.4.
+        let across = Touch::of_c([0.4 - 8.0, 0.0, -202.684], X, 60.0);
+        check(machine, across, SWAP, &[("flip_X", 1.0)], "", 0.4);
+        // X and Y for each other: would be met at (2, 3.464), 4 mm out. 0.5 (3.464 + 0.866 t) + 0.866 (2 + 0.5 t) = 4, t = 0.618 802.
+        let across = Touch::of_c([4.0 - 8.0, 0.0, -202.684], X, 60.0);
+        check(machine, across, SWAP, &[("swap_XY", 1.0)], "", 0.618_802_154);
+    }
+    // B of the head: shown at -0.1, the ball hangs 202.684 sin 0.1 to -X in place of +X: 0.707 498 further in, met so much further out
+    let tilted = on(&table, [0.0, 0.0, -202.684], X).tilted(-0.1);
+    check(&table, tilted, SWAP, &[("flip_B", 1.0)], "", 0.707_500_269);
+    // A of the table as C above: the upper face of a block 50 mm beside its line
+    let aside = Touch::of_c([0.0, 50.0, -250.0], Z, 0.0).tilted(0.1);
+    check(&head, aside, SWAP, &[("flip_A", 1.0)], "", -0.174_484_895);
+    // Y: the upper face looks to (0, -0.5, 0.866) at A = 30 and would be met 0.8 mm from the line, at Y = -0.4:
+    // -0.5 (0.4 + 0.5 t) + 0.866 * 0.866 t = -0.5 * -0.4, t = 0.8
+    let upper = Touch::of_c([0.0, 0.0, -250.0 + 0.8 - 8.0], Z, 0.0).tilted(30.0);
+    check(&head, upper, SWAP, &[("flip_Y", 1.0)], "", 0.8);
+    // Z: it looks to (0, -0.866, 0.5) at A = 60 and would be met at Z = 0.2, 47.516 mm above the line of A:
+    // -0.5 (0.2 + 0.5 t) + 0.75 t = 0.5 * 0.2, t = 0.4
+    let upper = Touch::of_c([0.0, 0.0, -250.0 + 2.0 * 47.516 - 8.0], Z, 0.0).tilted(60.0);
+    check(&head, upper, SWAP, &[("flip_Z", 1.0)], "", 0.4);
+    // Y and Z: the face looks to (0, 0.866, 0.5) at A = -60 and would be met at Y = 0.5, Z = 0, which is 47.316 above the line:
+    // 0.866 * 0.5 t + 0.5 (0.5 + 0.866 t) = 0.866 * 0.5, t = 0.211 325
+    let upper = Touch::of_c([0.0, -40.726_857_989, -233.908_987_298], Z, 0.0).tilted(-60.0);
+    check(&head, upper, SWAP, &[("swap_YZ", 1.0)], "", 0.211_324_865);
+    // Z and X: at A = 90, C = 60 the face +X looks to (0.5, 0, 0.866) and would be met at X = 0, Z = 0.5, 47.816 above the line
+    let side = Touch::of_c([33.409_870_695, 23.908, -250.0], X, 60.0).tilted(90.0);
+    check(&head, side, SWAP, &[("swap_ZX", 1.0)], "", 0.211_324_865);
+}
+
 /// An axis loses its position by +10 µm, C by +40 µrad, 3.6 s after the first touch; the second comes after 10 s.
 #[test]
 fn an_axis_is_elsewhere_from_some_moment_on() {
