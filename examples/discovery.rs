@@ -1,9 +1,7 @@
 //! Hidden effects at full count: `cargo run --release --example discovery [-- PART COUNT]`. The table stands in
-//! docs/discovery.md. Parts: planted (paper, full), clean (clean-paper,
-//! clean-paper-visits, clean-full, clean-full-visits), two, strange; all of them without an argument.
-//! Planted by the generator of tests/discovery on all machines: faults (faults-paper, faults-full, faults-weak, faults-two), faultless
-//! (faultless-paper, faultless-full; with one scatter in µm: faultless-paper-0.3), mistakes; on one sphere: faults-sphere,
-//! faultless-sphere.
+//! docs/discovery.md. Parts, all of them without an argument: planted by the generator of tests/discovery on all machines: faults
+//! (faults-paper, faults-full, faults-weak, faults-two), faultless (faultless-paper, faultless-full; with one scatter in µm:
+//! faultless-paper-0.3), mistakes; on one sphere: faults-sphere, faultless-sphere. What is in no catalogue: strange.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)] // a measurement that cannot be made shall stop
 #![allow(missing_docs)]
 
@@ -15,83 +13,15 @@ mod discovery;
 mod generator;
 
 use axiscal::diagnose::Verdict;
-use discovery::measure::{Clean, Outcome, both_named, clean, planted, two};
 use discovery::plant::Bench;
 use discovery::strange::{self, Seen};
 use generator::bench::Bench as Machines;
 use generator::judge::{self, Conditions};
 use generator::mistakes::MISTAKES;
 use generator::peers::{self, Cases};
-use std::collections::BTreeMap;
 
 fn percent(part: usize, of: usize) -> String {
     format!("{:5.1} %", 100.0 * part as f64 / of.max(1) as f64)
-}
-
-fn share(outcomes: &[Outcome], what: impl Fn(&Outcome) -> bool) -> String {
-    percent(outcomes.iter().filter(|o| what(o)).count(), outcomes.len())
-}
-
-fn report_planted(name: &str, outcomes: &[Outcome]) {
-    let n = outcomes.len();
-    println!("planted, {name}: {n} cases, {} with another shape", share(outcomes, |o| o.other_shape));
-    println!(
-        "  proposed {}  missing-effect {}",
-        share(outcomes, |o| o.proposed),
-        share(outcomes, |o| o.verdict.is_missing_effect())
-    );
-    println!(
-        "  by name {}  first group {} (mean size {:.1})  first three {}",
-        share(outcomes, |o| o.by_name),
-        share(outcomes, |o| o.first_group),
-        outcomes.iter().map(|o| o.group_size as f64).sum::<f64>() / n as f64,
-        share(outcomes, |o| o.first_three)
-    );
-    for bent in [false, true] {
-        let part: Vec<Outcome> = outcomes.iter().filter(|o| o.other_shape == bent).cloned().collect();
-        println!(
-            "    {}: by name {}  first group {}  first three {}",
-            if bent { "another shape" } else { "own shape" },
-            share(&part, |o| o.by_name),
-            share(&part, |o| o.first_group),
-            share(&part, |o| o.first_three)
-        );
-    }
-    let mean = |f: &dyn Fn(&Outcome) -> f64| outcomes.iter().map(f).sum::<f64>() / n as f64;
-    println!(
-        "  reduced RMS {:.2} -> {:.3} um  held-out falls {}",
-        mean(&|o| o.reduced_before),
-        mean(&|o| o.reduced_after),
-        share(outcomes, |o| o.held_out_falls)
-    );
-    let mut verdicts: BTreeMap<String, usize> = BTreeMap::new();
-    outcomes.iter().for_each(|o| *verdicts.entry(o.verdict.as_str().to_owned()).or_default() += 1);
-    println!("  verdicts {verdicts:?}");
-    for o in outcomes.iter().filter(|o| !o.first_group || !o.by_name) {
-        println!(
-            "  - {}{} lambda {:.0}: {}{:?} {:.3?}",
-            o.truth,
-            if o.other_shape { " (bent)" } else { "" },
-            o.lambda,
-            if o.first_group { "" } else { "MISSED " },
-            o.groups,
-            o.shares
-        );
-    }
-}
-
-fn report_clean(name: &str, verdicts: &[Clean]) {
-    let count = |v: &str| verdicts.iter().filter(|x| x.verdict.as_str() == v).count();
-    println!(
-        "clean, {name}: {} runs, not adequate {} (missing-effect {}, unexplained {})",
-        verdicts.len(),
-        percent(verdicts.len() - count("adequate"), verdicts.len()),
-        count("missing-effect"),
-        count("unexplained")
-    );
-    for c in verdicts.iter().filter(|c| c.verdict != Verdict::Adequate) {
-        println!("  - {}", c.because);
-    }
 }
 
 fn report_strange(name: &str, seen: &[Seen]) {
@@ -145,6 +75,9 @@ fn report_faults(name: &str, outcomes: &[judge::Outcome]) {
     println!("  by name     {}", of(&|o| o.by_name));
     println!("  proposed    {}", of(&|o| o.proposed));
     println!("  two names for one fault {}", of(&|o| o.pair));
+    println!("  held-out error falls    {}", of(&|o| o.held_out_falls));
+    let mean = |what: &dyn Fn(&judge::Outcome) -> f64| outcomes.iter().map(what).sum::<f64>() / outcomes.len() as f64;
+    println!("  reduced RMS {:.2} -> {:.3}", mean(&|o| o.reduced.0), mean(&|o| o.reduced.1));
 }
 
 /// The parts that the generator of tests/discovery plants.
@@ -237,51 +170,11 @@ fn main() {
         return cases(std::path::Path::new(&arguments[1]), count);
     }
     let count = |full: usize| arguments.get(1).map_or(full, |n| n.parse().unwrap());
-    let wanted = |name: &str| part == "all" || part == name;
     of_the_generator(part, &count);
-    let began = std::time::Instant::now();
-    if wanted("planted") || part == "paper" {
-        report_planted("paper's plan", &planted(&Bench::paper(), count(400), 1));
-        println!("  [{:.0} s]", began.elapsed().as_secs_f64());
-    }
-    if wanted("planted") || part == "full" {
-        report_planted("full", &planted(&Bench::full(), count(400), 2));
-        println!("  [{:.0} s]", began.elapsed().as_secs_f64());
-    }
-    // two axes with 0.5 um each, as the machine file declares
-    let declared_um = 0.5f64.hypot(0.5);
-    let clean_cases = [
-        ("clean-paper", "paper's plan", Bench::paper as fn() -> Bench, 0.0, 3),
-        ("clean-paper-visits", "paper's plan, 0.7 um per visit as declared", Bench::paper, declared_um, 5),
-        ("clean-full", "full", Bench::full, 0.0, 4),
-        ("clean-full-visits", "full, 0.5 um per visit", Bench::full, 0.5, 6),
-    ];
-    for (name, says, bench, visit_um, seed) in clean_cases {
-        if wanted("clean") || part == name {
-            report_clean(says, &clean(&bench().with_visits(visit_um), count(2000) as u64, None, seed));
-            println!("  [{:.0} s]", began.elapsed().as_secs_f64());
-        }
-    }
-    if wanted("strange") {
+    if part == "all" || part == "strange" {
         let bench = Bench::full();
         for (kind, (name, _, _)) in strange::KINDS.iter().enumerate() {
             report_strange(name, &strange::run(&bench, kind, count(100) as u64, 100 * kind as u64 + 8));
         }
-        println!("  [{:.0} s]", began.elapsed().as_secs_f64());
-    }
-    if wanted("two") {
-        let found = two(&Bench::full(), count(400), 7);
-        let both = found.iter().filter(|(t, s)| both_named(t, s)).count();
-        let more = found.iter().filter(|(_, s)| s.len() > 2).count();
-        println!(
-            "two hidden, full: {} cases, both named {}, more than two {}",
-            found.len(),
-            percent(both, found.len()),
-            percent(more, found.len())
-        );
-        for (truths, steps) in found.iter().filter(|(t, s)| !both_named(t, s)) {
-            println!("  - {truths:?}: {steps:?}");
-        }
-        println!("  [{:.0} s]", began.elapsed().as_secs_f64());
     }
 }

@@ -20,8 +20,7 @@ pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision) ->
     if decision.confirmed {
         // the first effect of two is found by itself, and the other one after it
         let leader: &Group = seen.groups.first()?;
-        let simpler = pair.n_parameters <= search.scores[leader.first()].n_parameters;
-        if leader.holds(pair.first) || leader.holds(pair.second) || !simpler {
+        if leader.holds(pair.first) || leader.holds(pair.second) {
             return None;
         }
     }

@@ -63,37 +63,37 @@ fn observe_nominal(
         }
         (touches, DVector::from_iterator(free.len(), free.iter().map(|&i| theta[i])))
     };
-    let shapes: Vec<usize> = (0..free.len()).filter(|&c| model.unknowns[free[c]].shape).collect();
-    let (mut seen, gram) = if !has_shapes(model) {
-        let (touches, at) = at(theta);
-        let gram = solve::Problem::normal(&touches, &at, true).gram;
-        let seen =
-            solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
-        (seen, gram)
-    } else {
+    let is_free = |i: usize| free.binary_search(&i).is_ok();
+    let of_shapes = |i: usize| {
+        let u = &model.unknowns[i];
+        !u.shape && model.unknowns.iter().any(|s| s.shape && s.effect == u.effect)
+    };
+    // a search that goes on from another one begins at its values: they are no errorless machine
+    let bare_at = |i: usize| {
+        let u = &model.unknowns[i];
+        if !u.shape && (of_shapes(i) || is_free(i)) { u.start } else { theta[i] }
+    };
+    let bare: Vec<f64> = (0..theta.len()).map(bare_at).collect();
+    let (mut seen, gram) = if has_shapes(model) {
         // a shape needs the sizes of its effect to leave a trace; nothing else does, and beside them a tilt that no touch sees
         // would leave one of second order
-        let of_shapes = |i: usize| {
-            let u = &model.unknowns[i];
-            !u.shape && model.unknowns.iter().any(|s| s.shape && s.effect == u.effect)
-        };
-        // a search that goes on from another one begins at its values: they are no errorless machine
-        let bare_at = |i: usize| {
-            let u = &model.unknowns[i];
-            if !u.shape && (of_shapes(i) || free.binary_search(&i).is_ok()) { u.start } else { theta[i] }
-        };
-        let bare: Vec<f64> = (0..theta.len()).map(bare_at).collect();
         let sized: Vec<f64> = (0..theta.len()).map(|i| if of_shapes(i) { theta[i] } else { bare[i] }).collect();
         let jacobian_at = |theta: &[f64]| {
             let (touches, at) = at(theta);
             solve::Problem::jacobian(&touches, &at)
         };
         let (mut jacobian, there) = (jacobian_at(&bare), jacobian_at(&sized));
-        for c in shapes {
+        for c in (0..free.len()).filter(|&c| model.unknowns[free[c]].shape) {
             jacobian.set_column(c, &there.column(c));
         }
         let gram = jacobian.tr_mul(&jacobian);
         (solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&jacobian)), gram)
+    } else {
+        let (touches, at) = at(&bare);
+        let gram = solve::Problem::normal(&touches, &at, true).gram;
+        let seen =
+            solve::observe_gram(&gram).unwrap_or_else(|| solve::observe(&solve::Problem::jacobian(&touches, &at)));
+        (seen, gram)
     };
     seen.hold(held_first(model, free));
     (seen, gram)

@@ -41,6 +41,10 @@ pub struct Outcome {
     pub proposed: bool,
     /// Two effects are named together, where one fault was planted.
     pub pair: bool,
+    /// The error of index positions left out falls with the effect that is named first.
+    pub held_out_falls: bool,
+    /// Reduced RMS before, and with a right name of the first group (else its first) in the model.
+    pub reduced: (f64, f64),
 }
 
 /// As `diagnose` asks, refits included, without what is only said beside the answer.
@@ -228,7 +232,11 @@ fn one(
     let d = ask(bench, &fit, &settings);
     let groups = groups(&d);
     let right = |id: &String| fault.expects.contains(id);
+    let added = groups.first().and_then(|g| g.iter().find(|id| right(id)).or(g.first()));
+    let after = added.map(|id| self::fit(bench, &touches, std::slice::from_ref(id)).0);
     Outcome {
+        held_out_falls: d.candidates.first().is_some_and(|c| c.held_out_after_um < c.held_out_before_um),
+        reduced: (reduced_rms(&fit), reduced_rms(after.as_ref().unwrap_or(&fit))),
         bench: bench.name.clone(),
         what: fault.what.clone(),
         expects: fault.expects.clone(),

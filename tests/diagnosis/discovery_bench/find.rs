@@ -46,29 +46,6 @@ pub fn look(machine: &Machine, catalogue: &Catalogue, fit: &Fit, settings: &Sett
 /// Without the refit and the figures that only a reader needs.
 pub const LEAN: Options = Options { at_most: 3, refit: false, power: false, planned: None };
 
-/// A group as a reader sees it.
-pub fn groups(d: &Diagnosis) -> Vec<Vec<String>> {
-    d.candidates.iter().map(|c| std::iter::once(c.effect.clone()).chain(c.same_as.iter().cloned()).collect()).collect()
-}
-
-/// The loop: look, add what is proposed first, look again. The group of each step.
-pub fn ladder(machine: &Machine, catalogue: &Catalogue, data: &Data, at_most: usize) -> (Vec<Vec<String>>, Diagnosis) {
-    let mut more: Vec<String> = Vec::new();
-    let mut steps = Vec::new();
-    loop {
-        let (now, settings) = fit(machine, catalogue, data.clone(), &more, None);
-        let d = look(machine, catalogue, &now, &settings, &LEAN);
-        let first = groups(&d).into_iter().next();
-        match first.filter(|_| d.candidates[0].proposed && steps.len() < at_most) {
-            Some(group) => {
-                more.push(group[0].clone());
-                steps.push(group);
-            }
-            None => return (steps, d),
-        }
-    }
-}
-
 /// RMS over noise with the sketched effect in the model; `None` where nothing can be sketched.
 pub fn sketched(machine: &Machine, built_in: &Catalogue, first: &Fit, settings: &Settings) -> Option<f64> {
     let made = sketch::sketch(Subject { machine, catalogue: built_in, settings, fit: first }, &|id| built_in.knows(id))
