@@ -7,18 +7,15 @@
 
 #[path = "../tests/common/mod.rs"]
 mod common;
-#[path = "../tests/diagnosis/discovery_bench/mod.rs"]
-mod discovery;
 #[path = "../tests/discovery/mod.rs"]
 mod generator;
 
 use axiscal::diagnose::Verdict;
-use discovery::plant::Bench;
-use discovery::strange::{self, Seen};
 use generator::bench::Bench as Machines;
 use generator::judge::{self, Conditions};
 use generator::mistakes::MISTAKES;
 use generator::peers::{self, Cases};
+use generator::strange::{self, Seen};
 
 fn percent(part: usize, of: usize) -> String {
     format!("{:5.1} %", 100.0 * part as f64 / of.max(1) as f64)
@@ -46,8 +43,8 @@ fn report_strange(name: &str, seen: &[Seen]) {
     }
     for s in seen.iter().filter(|s| !s.right() || s.bare || s.verdict == Verdict::Adequate).take(12) {
         println!(
-            "  - {:?} lambda {:.0} first {:?} then {:?}, proposed {:?}, {} rejected",
-            s.verdict, s.lambda, s.first, s.depends, s.proposed, s.rejected
+            "  - {:?} noncentrality {:.0} first {:?} then {:?}, proposed {:?}, {} rejected",
+            s.verdict, s.noncentrality, s.first, s.depends, s.proposed, s.rejected
         );
     }
 }
@@ -172,9 +169,8 @@ fn main() {
     let count = |full: usize| arguments.get(1).map_or(full, |n| n.parse().unwrap());
     of_the_generator(part, &count);
     if part == "all" || part == "strange" {
-        let bench = Bench::full();
         for (kind, (name, _, _)) in strange::KINDS.iter().enumerate() {
-            report_strange(name, &strange::run(&bench, kind, count(100) as u64, 100 * kind as u64 + 8));
+            report_strange(name, &strange::run(kind, count(100) as u64, 100 * kind as u64 + 8));
         }
     }
 }

@@ -179,7 +179,8 @@ fn wrapped(text: &str, width: usize) -> Vec<String> {
 fn entry(word: &str, text: &str) -> String {
     const INDENT: usize = 18;
     let text = wrapped(text, WIDTH - INDENT).join(&format!("\n{}", " ".repeat(INDENT)));
-    format!("  {word:<width$}{text}\n", width = INDENT - 2)
+    let gap = if word.chars().count() < INDENT - 2 { "" } else { " " };
+    format!("  {word:<width$}{gap}{text}\n", width = INDENT - 2)
 }
 
 /// On which machines an effect applies, in words.

@@ -243,6 +243,9 @@ pub struct Candidate {
     pub says: String,
     /// Where to look on the machine and how to confirm it.
     pub look: String,
+    /// What usually makes it far larger than machines have it.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub too_large: String,
     /// Share of the misfit's sum of squares that it takes away.
     pub share: f64,
     /// The largest expected size, in usual sizes.

@@ -480,6 +480,7 @@ fn candidate(
         never_parted: false,
         says,
         look: effect.look.clone(),
+        too_large: effect.too_large.clone(),
         share: taken / total,
         times_usual: score.relative_size(),
         plausible: score.relative_size() <= crate::search::groups::PLAUSIBLE,

@@ -41,7 +41,8 @@ pub struct Oversized {
     pub check: String,
 }
 
-/// Of a fit, those of the machine first, the largest in usual sizes first. Where blocks stand is no error, however far it is.
+/// Of a fit, those of the machine first, the largest in usual sizes first. A block may stand where it wants, within five times the tenths of a
+/// millimetre by which one is usually placed.
 pub(super) fn oversized(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> Vec<Oversized> {
     let find = |p: &Parameter| fit.model.unknowns.iter().find(|u| u.name == p.name && u.effect == p.effect);
     let identified = fit.outcome.parameters.iter().filter(|p| p.status == Status::Identified);
@@ -59,9 +60,7 @@ fn of_parameter(p: &Parameter, u: &Unknown, effect: &Effect) -> Option<Oversized
     let positive = effect.parameters.iter().any(|e| e.name == u.own_name() && e.positive);
     let wrong_sign = positive && p.value < 0.0;
     let most = if wrong_sign { u.typical } else { PLAUSIBLE * u.typical };
-    // a block that stands elsewhere is no matter; one that is turned may be another block
-    let is_place = u.is_set_up() && u.unit != "deg";
-    if u.shape || is_place || u.typical <= 0.0 || p.value.abs() - 2.0 * sigma <= most {
+    if u.shape || u.typical <= 0.0 || p.value.abs() - 2.0 * sigma <= most {
         return None;
     }
     Some(Oversized {

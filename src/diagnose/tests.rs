@@ -68,3 +68,24 @@ fn a_refit_with_the_effect_that_acts_does_not_raise_the_error() {
     assert!(!raises_the_error(&without, &with));
     assert!(raises_the_error(&with, &without));
 }
+
+#[test]
+fn a_model_still_fails_where_touches_that_it_does_not_use_lie_together() {
+    let machines = machine::load(&source("machines.toml", machine::BUILT_IN)).unwrap().0;
+    let machine = machines.into_iter().find(|m| m.name == "swivel-head").unwrap();
+    let complete = fit_with(&["location-b", "block-setup", "pretravel", "scale-x"]);
+    let catalogue = Catalogue::built_in().unwrap();
+    let n = complete.data.observations.len();
+    let without = |touches: &mut dyn Iterator<Item = usize>| {
+        let mut fit = complete.clone();
+        for touch in touches {
+            fit.weight[touch] = 0.0;
+            fit.rejected.insert(touch, Reason::Outlier { off_mm: 0.02, standardised: 40.0, robust_only: false });
+        }
+        still_fails(&fit, &machine, &catalogue)
+    };
+    assert!(!without(&mut std::iter::empty()));
+    // six from anywhere, and six that follow one another on one face
+    assert!(!without(&mut (0..n).step_by(n / 6)));
+    assert!(without(&mut (0..6)));
+}

@@ -44,6 +44,15 @@ pub enum Side {
     Tool,
 }
 
+impl Side {
+    /// Which way a linear axis on this side moves what it carries as its NC coordinate grows: an NC coordinate says where the tool is
+    /// over the workpiece, so that a table moves the other way. The one place where the side of the chain gives a sign.
+    #[must_use]
+    pub fn travel_sign(self) -> f64 {
+        if self == Self::Workpiece { -1.0 } else { 1.0 }
+    }
+}
+
 /// A checked axis. Lengths mm in R, angles rad, except `range` (mm or **deg**, machine coordinates less the origin).
 #[derive(Debug, Clone)]
 pub struct Axis {
@@ -75,11 +84,10 @@ impl Axis {
         if self.name.is_rotary() { [low, high] } else { [low + END_RESERVE_MM, high - END_RESERVE_MM] }
     }
 
-    /// Which way a linear axis moves what it carries as its NC coordinate grows: an NC coordinate says where the tool is over the
-    /// workpiece, so that a table moves the other way. The one place where the side of the chain gives a sign.
+    /// Which way a linear axis moves what it carries as its NC coordinate grows.
     #[must_use]
     pub fn travel_sign(&self) -> f64 {
-        if self.side == Side::Workpiece { -1.0 } else { 1.0 }
+        self.side.travel_sign()
     }
 
     /// The motion of what the axis carries, in R.

@@ -1,6 +1,7 @@
 //! `effects.toml` as a person wrote it: every field as it stands, with its place in the file. Nothing is checked here.
 
 use super::surface::Body;
+use crate::machine::Side;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use toml::Spanned;
@@ -54,6 +55,9 @@ pub struct EffectAsWritten {
     pub at: Placed,
     /// Applies where its axes stand on this side only.
     pub side: Option<SideAsWritten>,
+    /// Of a row with `{place}` in a formula: the side of its axis.
+    #[serde(skip)]
+    pub place_on: Option<Side>,
     /// `line`: constant errors of a rotary axis turn about its own line, as its error motions always do. `ball`: rotations
     /// of a linear axis that bears the workpiece are stated at the ball's centre at zero, not at the origin of R.
     pub about: Option<About>,

@@ -92,6 +92,8 @@ pub struct Effect {
     pub too_large: String,
     /// Applies where its axes stand on this side only.
     pub side: Option<Side>,
+    /// Of a row with `{place}` in a formula: its axis, which stands on this side.
+    pub place_on: Option<(AxisName, Side)>,
     /// The axes that it needs.
     pub needs: Vec<AxisName>,
     /// The axes without which it applies only.
@@ -130,7 +132,8 @@ impl Effect {
     pub fn applies_to(&self, machine: &Machine) -> bool {
         let here =
             |name: &AxisName| machine.axis(*name).is_some_and(|axis| self.side.is_none_or(|side| axis.side == side));
-        self.needs.iter().all(here) && !self.unless.iter().any(here)
+        let stands = |(name, side): (AxisName, Side)| machine.axis(name).is_some_and(|axis| axis.side == side);
+        self.needs.iter().all(here) && !self.unless.iter().any(here) && self.place_on.is_none_or(stands)
     }
 
     /// True when it may act on a machine beside any model: it applies, and is no set of the paper's and no hypothesis.
@@ -161,6 +164,10 @@ impl Effect {
     /// True when no machine can have both: rows of one id must differ so.
     pub(super) fn excludes(&self, other: &Self) -> bool {
         let shared = |a: &[AxisName], b: &[AxisName]| a.iter().any(|name| b.contains(name));
+        // of a place the rows differ in the side of its axis
+        if self.place_on.zip(other.place_on).is_some_and(|(a, b)| a.0 == b.0 && a.1 != b.1) {
+            return true;
+        }
         match (self.side, other.side) {
             (a, b) if a == b => shared(&self.needs, &other.unless) || shared(&other.needs, &self.unless),
             (Some(_), Some(_)) => shared(&self.needs, &other.needs),

@@ -117,6 +117,16 @@ impl<'a> Check<'a> {
             let message = format!("{:?} is no direction of a lever arm", arm.get_ref());
             self.error(&arm.span(), "effects::arm", message, "write \"x\", \"y\" or \"z\"");
         }
+        if w.has_place() {
+            let message = format!("a formula of {:?} has {{place}}, and `at` is no linear axis", w.id.get_ref());
+            self.error(
+                &w.at.span(),
+                "effects::place",
+                message,
+                "at = \"X\", \"Y\" or \"Z\": {place} is where its carriage stands",
+            );
+            return None;
+        }
         let mut parameters: Vec<Parameter> = Vec::new();
         for t in &w.terms {
             self.factor(w, t, &mut parameters);
@@ -157,6 +167,7 @@ impl<'a> Check<'a> {
             mends: w.mends.clone(),
             too_large: w.too_large.clone(),
             side: w.side.map(|s| if s == SideAsWritten::Tool { Side::Tool } else { Side::Workpiece }),
+            place_on: axis(w.at.get_ref()).zip(w.place_on),
             needs,
             unless,
             includes: w.includes.iter().map(|id| id.get_ref().clone()).collect(),

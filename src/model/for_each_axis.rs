@@ -1,9 +1,10 @@
 //! A row of effects with `axes` stands for one row of each axis: letters in braces follow the axis ([`AxisName::fill_in`]). A row with
 //! `{place}` in a formula stands for one row of each side of the chain.
 
-use super::as_written::{EffectAsWritten, Placed, SideAsWritten, Typical};
+use super::as_written::{EffectAsWritten, Placed, Typical};
 use super::lever_arm::with_arm;
 use crate::axes::AxisName;
+use crate::machine::Side;
 
 /// The rows of a file, one for each axis. Rows with `with_previous` are repeated together with the row before them.
 pub(super) fn expand(
@@ -23,27 +24,32 @@ pub(super) fn expand(
     out.into_iter().flat_map(EffectAsWritten::for_sides).map(with_arm).collect()
 }
 
-/// Where the carriage of the row's axis stands on its guideway, mm or rad. What bears the tool stands at its coordinate; what bears the
-/// workpiece goes the other way and stands at minus its coordinate.
+/// Where the carriage of the row's axis stands on its guideway, mm.
 const PLACE: &str = "{place}";
 
 impl EffectAsWritten {
+    /// Does a formula speak of the place of the row's axis?
+    pub(super) fn has_place(&self) -> bool {
+        self.terms.iter().any(|term| term.formula.get_ref().contains(PLACE))
+    }
+
+    /// One row for each side, where a formula speaks of the place of the row's linear axis.
     fn for_sides(self) -> Vec<Self> {
-        if !self.terms.iter().any(|term| term.formula.get_ref().contains(PLACE)) {
+        let at = self.at.get_ref().clone();
+        if !self.has_place() || !["X", "Y", "Z"].contains(&at.as_str()) {
             return vec![self];
         }
-        let on = |(side, sign): (SideAsWritten, &str)| {
+        let on = |side: Side| {
             let mut row = self.clone();
-            row.side = Some(side);
-            let place = format!("({sign}{})", row.at.get_ref());
+            row.place_on = Some(side);
+            let sign = if side.travel_sign() < 0.0 { "-" } else { "" };
             for term in &mut row.terms {
-                let formula = term.formula.get_ref().replace(PLACE, &place);
+                let formula = term.formula.get_ref().replace(PLACE, &format!("({sign}{at})"));
                 *term.formula.get_mut() = formula;
             }
             row
         };
-        let sides = [(SideAsWritten::Tool, ""), (SideAsWritten::Workpiece, "-")];
-        sides.into_iter().filter(|(side, _)| self.side.is_none_or(|own| own == *side)).map(on).collect()
+        [Side::Tool, Side::Workpiece].map(on).into()
     }
 
     fn for_axis(&self, axis: AxisName, number: usize) -> Self {
@@ -70,8 +76,8 @@ impl EffectAsWritten {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::diag::source;
-    use crate::machine::Side;
     use crate::model::catalogue::Catalogue;
 
     #[test]
@@ -109,7 +115,13 @@ mod tests {
                     \"{place} + X\" }]\n";
         let mut catalogue = Catalogue::default();
         catalogue.add_file(&source("my.toml", text.to_owned())).unwrap();
-        let found: Vec<_> = catalogue.iter().map(|e| (e.side, e.terms[0].formula.text())).collect();
-        assert_eq!(found, [(Some(Side::Tool), "(X) + X"), (Some(Side::Workpiece), "(-X) + X")]);
+        let found: Vec<_> = catalogue.iter().map(|e| (e.place_on, e.terms[0].formula.text())).collect();
+        let on = |side| Some((AxisName::X, side));
+        assert_eq!(found, [(on(Side::Tool), "(X) + X"), (on(Side::Workpiece), "(-X) + X")]);
+        for at in ["base", "C"] {
+            let wrong = text.replace("\"X\"", &format!("{at:?}"));
+            let findings = Catalogue::default().add_file(&source("my.toml", wrong)).unwrap_err();
+            assert_eq!(findings.0.iter().map(|f| f.code).collect::<Vec<_>>(), ["effects::place"], "{at}");
+        }
     }
 }

@@ -86,6 +86,11 @@ pub struct Chain {
     tool_direction: Vec3,
 }
 
+/// A coordinate says where the tool is over the workpiece: what bears the workpiece goes, and stands, the other way.
+pub(super) fn goes_backwards(axis: &machine::Axis) -> bool {
+    !axis.name.is_rotary() && axis.side == Side::Workpiece
+}
+
 impl Chain {
     /// The chain of a machine; `reference` is the point (mm in R) at which errors of workpiece-side rotary axes are
     /// stated.
@@ -96,7 +101,7 @@ impl Chain {
             axes.map(move |a| {
                 let rotary = a.name.is_rotary();
                 let point = [a.point.x, a.point.y, a.point.z];
-                let backwards = !rotary && side == Side::Workpiece;
+                let backwards = goes_backwards(a);
                 let error_points = match (rotary, side) {
                     (false, _) => [[0.0; 3]; 2],
                     // what moves with the table is stated at the axis, not at a point that stands still

@@ -64,6 +64,13 @@ pub(crate) fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
     out
 }
 
+fn unusually_large(c: &Candidate) -> String {
+    let or =
+        if c.same_as.is_empty() { "Or another effect looks like it" } else { "Or another effect of its group acts" };
+    let cause = if c.too_large.is_empty() { String::new() } else { format!("Probable cause: {}. ", c.too_large) };
+    format!("{} would be {:.0} times its usual size. {cause}{or}", c.effect, c.times_usual)
+}
+
 /// What is to be known of the effect that is named.
 fn of_candidate(first: &Candidate) -> Vec<String> {
     let mut out = Vec::new();
@@ -71,10 +78,7 @@ fn of_candidate(first: &Candidate) -> Vec<String> {
         out.push(wrong_sign(first));
     }
     if !first.plausible {
-        out.push(match first.same_as.len() {
-            0 => format!("{} would be unusually large: another effect may look like it", first.effect),
-            _ => format!("{} would be unusually large: look first at the other effects of its group", first.effect),
-        });
+        out.push(unusually_large(first));
     }
     for w in &first.weakens {
         out.push(format!(

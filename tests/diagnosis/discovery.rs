@@ -4,7 +4,7 @@
 
 use crate::discovery_bench::find;
 use crate::discovery_bench::plant::{self, Bench};
-use crate::discovery_bench::strange;
+use crate::generator::strange;
 use axiscal::diagnose::{Diagnosis, Options, Subject, Verdict, with_effects};
 use axiscal::fit::{Settings, identify_beside, identify_data};
 use axiscal::model::catalogue::Catalogue;
@@ -24,10 +24,9 @@ fn check(what: &str, hits: usize, n: usize, bar: f64) {
 
 #[test]
 fn what_is_in_no_catalogue_is_never_adequate() {
-    let bench = Bench::full();
     let (mut right_of_all, mut all, mut bare, mut after_two) = (0, 0, 0, 0);
     for (kind, (name, _, smooth)) in strange::KINDS.iter().enumerate() {
-        let seen = strange::run(&bench, kind, 4, 105 + 100 * kind as u64);
+        let seen = strange::run(kind, 4, 105 + 100 * kind as u64);
         for s in &seen {
             assert!(s.verdict != Verdict::Adequate, "{name}: {s:?}");
             if *smooth {
@@ -177,6 +176,16 @@ fn what_would_be_left_is_what_a_refit_leaves() {
     let after = with_effects(more, &[made.id.as_str()]).unwrap().outcome.rms_um;
     let first = &made.tried[0];
     assert!((first.left_um / after - 1.0).abs() < 0.02, "{} said, {after} found\n{}", first.left_um, made.toml);
+}
+
+/// A block 1.7 mm from its place fits, and is said to be too far off: it may be another one.
+#[test]
+fn a_block_far_from_its_place_is_a_finding() {
+    let d = said_of_a_block("[[block]]\nmounting = \"full\"\nname = \"b\"\nshift = [1.7, 0.0, 0.0]\n");
+    assert_eq!(d.verdict, Verdict::Adequate, "{}", d.says);
+    let found: Vec<&str> = d.oversized.iter().map(|o| o.parameter.as_str()).collect();
+    assert_eq!(found, ["SX@full/b"], "{}", d.says);
+    assert!(d.says.contains("another block stands there"), "{}", d.says);
 }
 
 /// A trial that begins where another fit has ended is held to what nominal touches see, as one that begins at nothing: where blocks stand

@@ -33,6 +33,8 @@ pub struct At<'a> {
     pub direction: [f64; 6],
     /// How far each axis has turned since it last turned back, rad.
     pub since_reversal: [f64; 6],
+    /// Where each rotary axis stood before it came to where it stands, rad; 0 before its first motion.
+    pub pose_before: [f64; 6],
     /// Way of the ball in the frame of the probe, which turns with the spindle.
     pub approach: V,
     /// Unit vector from the ball to the spindle, in R.
@@ -222,6 +224,7 @@ impl Bench {
             kelvin: 0.0,
             direction: [0.0; 6],
             since_reversal: [0.0; 6],
+            pose_before: [0.0; 6],
             approach,
             spindle: head * own,
             down_in_head: head.transpose() * -V::z(),
@@ -306,6 +309,7 @@ struct Motion {
     last_start: [f64; 6],
     direction: [f64; 6],
     turned_back_at: [f64; 6],
+    pose_before: [f64; 6],
 }
 
 impl Motion {
@@ -315,6 +319,9 @@ impl Motion {
             let i = name.index();
             let wanted = touch.from.get(name).unwrap_or(0.0);
             let came = if self.known { start[i] - self.last_start[i] } else { 0.0 };
+            if name.is_rotary() && came.abs() > 1e-9 {
+                self.pose_before[i] = self.last_start[i];
+            }
             let searched = end[i] - start[i];
             let moves = [searched, wanted, came];
             if let Some(motion) = moves.into_iter().find(|m| m.abs() > 1e-9) {
@@ -332,7 +339,7 @@ impl Motion {
             }
             at.since_reversal[i] = start[i] - self.turned_back_at[i];
         }
-        at.direction = self.direction;
+        (at.direction, at.pose_before) = (self.direction, self.pose_before);
         (self.known, self.last_start) = (true, start);
     }
 }

@@ -108,10 +108,29 @@ terms = [
   { parameter = "q3", unit = "urad", dof = "C", formula = "sA + sC", at = "reading" },
 ]
 unless = ["B"]
+[[effect]]
+id = "own-carriage"
+at = "X"
+about = "ball"
+arm = "z"
+terms = [
+  { parameter = "c1", unit = "um", dof = "dz", formula = "-({place}/300)^2 + X/500" },
+  { parameter = "c2", unit = "urad", dof = "ry", formula = "{place}/30 + sin(Y/90)" },
+]
+[[effect]]
+id = "own-bearing"
+at = "C"
+arm = "y"
+terms = [
+  { parameter = "d1", unit = "urad", dof = "rx", formula = "cos(3*C)" },
+  { parameter = "d2", unit = "urad", dof = "rz", formula = "sin(2*C)" },
+]
 "#;
 
 fn values(effect: &Effect, n_sets: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {
     let draw = |p: &axiscal::model::catalogue::Parameter, rng: &mut ChaCha8Rng| match p.shape {
+        // a lever arm, mm
+        Some((0.0, ..)) => rng.random_range(-300.0..300.0),
         Some((start, ..)) => start * rng.random_range(0.8..1.2),
         None => p.typical * rng.random_range(0.3..1.0),
     };
@@ -206,7 +225,7 @@ fn a_users_effect_is_planted_as_it_is_predicted() {
         }
     }
     println!("{n_planted} plantings of own effects; left at most {worst:e} mm");
-    assert!(does.len() == 11 && does.values().all(|mm| *mm > 1e-4), "{does:?}");
+    assert!(does.len() == 13 && does.values().all(|mm| *mm > 1e-4), "{does:?}");
 }
 
 #[test]

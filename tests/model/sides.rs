@@ -163,6 +163,8 @@ fn what_is_written_of_a_coordinate_acts_alike_on_both_sides() {
         // the coordinate, which is along the normal: -0.009 999 000.
         let at_100 = || on(&machine, [92.0, 0.0, -202.684], X);
         check(&machine, at_100(), "ambient-scale", &[("expansion", 10.0)], WARM, -0.009_999_000);
+        let y_at_100 = on(&machine, [0.0, 92.0, -202.684], Y);
+        check(&machine, y_at_100, "ambient-scale", &[("expansion", 10.0)], WARM, -0.009_999_000);
         // the same in Z, which is a head's on both machines: the top of a block 92 mm higher is met at Z = 100
         let above = on(&machine, [0.0, 0.0, -202.684 + 92.0], Z);
         check(&machine, above, "ambient-scale", &[("expansion", 10.0)], WARM, -0.009_999_000);
@@ -355,7 +357,18 @@ fn a_control_with_a_wrong_sign_or_two_swapped_axes() {
         // X and Y for each other: would be met at (2, 3.464), 4 mm out. 0.5 (3.464 + 0.866 t) + 0.866 (2 + 0.5 t) = 4, t = 0.618 802.
         let across = Touch::of_c([4.0 - 8.0, 0.0, -202.684], X, 60.0);
         check(machine, across, SWAP, &[("swap_XY", 1.0)], "", 0.618_802_154);
+        // Y: at C = 30 the face +X looks to (0.866, 0.5) and would be met at Y = 0.5 * 0.4 = 0.2: 0.75 t - 0.5 (0.2 + 0.5 t) = 0.5 * 0.2,
+        // t = 0.4
+        let across = Touch::of_c([0.4 - 8.0, 0.0, -202.684], X, 30.0);
+        check(machine, across, SWAP, &[("flip_Y", 1.0)], "", 0.4);
+        // Y and Z, of which one bears the table and the other the head of the one machine: would be met at Y = 2, Z = 0. The ball stands
+        // at Y = 0: 0.866 * 0.866 t = 0.5 * 2, t = 4/3
+        let across = || Touch::of_c([4.0 - 8.0, 0.0, -202.684], X, 30.0);
+        check(machine, across(), SWAP, &[("swap_YZ", 1.0)], "", 4.0 / 3.0);
+        // Z and X: at C = 60 would be met at X = 2, Z = 0. The ball stands at X = 0: 0.866 * 0.866 t = 0.5 * 2
+        check(machine, Touch { c_deg: 60.0, ..across() }, SWAP, &[("swap_ZX", 1.0)], "", 4.0 / 3.0);
     }
+    // Z alone turns only the way to a face that looks up, which is then never met: A has to tilt one (below)
     // B of the head: shown at -0.1, the ball hangs 202.684 sin 0.1 to -X in place of +X: 0.707 498 further in, met so much further out
     let tilted = on(&table, [0.0, 0.0, -202.684], X).tilted(-0.1);
     check(&table, tilted, SWAP, &[("flip_B", 1.0)], "", 0.707_500_269);

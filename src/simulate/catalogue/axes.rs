@@ -8,7 +8,8 @@
 use super::unit::Unit::{Deg, H, Mm, One, Um, UmPerM, Urad};
 use super::{Parameter, Refusal, Role, Settings, across, along, axis_here, axis_of, dof_letter};
 use crate::axes::AxisName;
-use crate::machine::{Machine, Side};
+use crate::machine::Machine;
+use crate::simulate::chain::goes_backwards;
 use crate::simulate::terms::{Shape, Target};
 
 /// The travel at which polynomial errors have their stated size, mm.
@@ -200,20 +201,26 @@ pub(super) fn about_a_point(
             Target::Axis { axis, after, dof } => (dof, &move |dof| Target::Axis { axis, after, dof }),
             _ => continue,
         };
-        // rx: y goes to z and z to -y; ry: z to x, x to -z; rz: x to y, y to -x. The point itself stays where it is
-        let (to, way) = match (dof, along) {
-            (3, 1) => (2, 1.0),
-            (3, 2) => (1, -1.0),
-            (4, 2) => (0, 1.0),
-            (4, 0) => (2, -1.0),
-            (5, 0) => (1, 1.0),
-            (5, 1) => (0, -1.0),
-            _ => continue,
-        };
+        // the point itself stays where it is
+        let Some((to, way)) = swept(dof, along) else { continue };
         acts.push((at(to), shape, -factor * way * arm));
     }
     turns.push(Parameter::signed_setting(&name, Mm).alias("arm"));
     turns
+}
+
+/// Which way a turn (3, 4, 5: about x, y, z) takes what lies along x, y or z (0, 1, 2). rx: y goes to z and z to -y; ry: z to x, x to -z;
+/// rz: x to y, y to -x.
+pub(in crate::simulate) fn swept(dof: usize, along: usize) -> Option<(usize, f64)> {
+    Some(match (dof, along) {
+        (3, 1) => (2, 1.0),
+        (3, 2) => (1, -1.0),
+        (4, 2) => (0, 1.0),
+        (4, 0) => (2, -1.0),
+        (5, 0) => (1, 1.0),
+        (5, 1) => (0, -1.0),
+        _ => return None,
+    })
 }
 
 /// A carriage on a guideway that is bowed upwards: at q from its middle it is lower by (q/300)² of the sag, and it leans
@@ -225,8 +232,7 @@ fn carriage_sag(
     settings: Settings<'_>,
 ) -> Result<Vec<Parameter>, Refusal> {
     let here = axis_here(axis, machine)?;
-    // a carriage that bears the workpiece stands on the other side of its middle than its coordinate says
-    let stands = if here.side == Side::Workpiece { -1.0 } else { 1.0 };
+    let stands = if goes_backwards(here) { -1.0 } else { 1.0 };
     // outwards and down: about +y where it runs along x, about -x where it runs along y
     let (about, way) = match axis {
         AxisName::X => (4, 1.0),

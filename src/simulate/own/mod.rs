@@ -36,6 +36,8 @@ struct OwnEffect {
     at: Spanned<String>,
     side: Option<OwnSide>,
     about: Option<OwnAbout>,
+    /// `x`, `y` or `z`.
+    arm: Option<Spanned<String>>,
     #[serde(default)]
     needs: Vec<Spanned<String>>,
     #[serde(default)]
@@ -52,6 +54,8 @@ struct OwnEffect {
     _look: String,
     #[serde(default, rename = "mends")]
     _mends: String,
+    #[serde(default, rename = "too_large")]
+    _too_large: String,
     #[serde(default, rename = "family")]
     _family: String,
     #[serde(rename = "includes")]
@@ -271,7 +275,12 @@ impl Reader<'_> {
                 parameters.push(OwnParameter { name: name.get_ref().clone(), unit, default });
             }
         }
-        let names: Vec<String> = parameters.iter().map(|p| p.name.clone()).collect();
+        let mut names: Vec<String> = parameters.iter().map(|p| p.name.clone()).collect();
+        let arm = row.arm.as_ref().and_then(|along| self.arm(row, along));
+        if let Some((name, _)) = &arm {
+            names.push(name.clone());
+            parameters.push(OwnParameter { name: name.clone(), unit: Unit::Mm, default: 0.0 });
+        }
         let mut needs = self.axes(&row.needs);
         let unless = self.axes(&row.unless);
         let mut acts = Vec::new();
@@ -281,17 +290,17 @@ impl Reader<'_> {
             if let Some(Target::Axis { axis, .. } | Target::OwnLine { axis, .. } | Target::Reading(axis)) = target {
                 needs.push(axis);
             }
-            let formula = match Formula::read(term.formula.get_ref(), &names) {
-                Ok(formula) => Some(formula),
-                Err((says, help)) => {
-                    let message = format!("formula of {:?}: {says}", row.id.get_ref());
-                    self.error(term.formula.span(), "effects::formula", message, help);
-                    None
-                }
-            };
+            let formula = self.formula(row, term, &names);
             let parameter = names.iter().position(|n| n == term.parameter.get_ref());
             if let (Some(parameter), Some(target), Some(formula)) = (parameter, target, formula) {
                 let target = self.on_own_line(target, &formula, row.about);
+                if let Some((name, along)) = &arm {
+                    acts.extend(shift_of_a_turn(target, *along).and_then(|(to, by)| {
+                        let text = format!("({})*{name}", term.formula.get_ref());
+                        let formula = Formula::read(&self.placed(row, &text)?, &names).ok()?;
+                        Some((parameter, to, formula, by))
+                    }));
+                }
                 if let Some(OwnAbout::Ball) = row.about {
                     let back = super::catalogue::axes::back_to_the_ball(target, self.machine);
                     acts.extend(back.into_iter().map(|(target, by)| (parameter, target, formula.clone(), by)));
@@ -313,6 +322,45 @@ impl Reader<'_> {
             needs.iter().find(|n| !here(n)).map(|n| format!("machine {:?} has no axis {n} there", self.machine.name));
         let has = unless.iter().find(|n| here(n)).map(|n| format!("machine {:?} has an axis {n}", self.machine.name));
         Some(Own { id: row.id.get_ref().clone(), parameters, acts, not_here: lacks.or(has) })
+    }
+
+    /// The parameter of a lever arm, and its direction.
+    fn arm(&mut self, row: &OwnEffect, along: &Spanned<String>) -> Option<(String, usize)> {
+        let direction = ["x", "y", "z"].iter().position(|d| d == along.get_ref());
+        if direction.is_none() {
+            let message = format!("unknown direction {:?}", along.get_ref());
+            self.error(along.span(), "effects::arm", message, "x, y or z".to_owned());
+        }
+        Some((format!("arm_{}", row.id.get_ref().replace('-', "_")), direction?))
+    }
+
+    fn formula(&mut self, row: &OwnEffect, term: &OwnTerm, names: &[String]) -> Option<Formula> {
+        let text = term.formula.get_ref();
+        let Some(placed) = self.placed(row, text) else {
+            let message =
+                format!("a formula of {:?} has {{place}}, and `at` is no linear axis of the machine", row.id.get_ref());
+            self.error(term.formula.span(), "effects::place", message, "at = \"X\", \"Y\" or \"Z\"".to_owned());
+            return None;
+        };
+        match Formula::read(&placed, names) {
+            Ok(formula) => Some(formula),
+            Err((says, help)) => {
+                let message = format!("formula of {:?}: {says}", row.id.get_ref());
+                self.error(term.formula.span(), "effects::formula", message, help);
+                None
+            }
+        }
+    }
+
+    /// A formula with the place of the row's axis on its guideway.
+    fn placed(&self, row: &OwnEffect, text: &str) -> Option<String> {
+        if !text.contains("{place}") {
+            return Some(text.to_owned());
+        }
+        let axis = axis_named(row.at.get_ref()).filter(|name| !name.is_rotary())?;
+        // what the machine lacks stands nowhere, and the row is passed over
+        let backwards = self.machine.axis(axis).is_some_and(super::chain::goes_backwards);
+        Some(text.replace("{place}", &format!("({}{axis})", if backwards { "0 - " } else { "" })))
     }
 
     /// How a rotary axis runs counts on its own line; what is constant says where that line lies, unless it turns a table
@@ -355,4 +403,16 @@ impl Reader<'_> {
         }
         target
     }
+}
+
+/// A turn about a point so far along x, y or z (0, 1, 2) also shifts what it turns: where, and by how much of turn and distance. The point
+/// itself stays where it is.
+fn shift_of_a_turn(target: Target, along: usize) -> Option<(Target, f64)> {
+    let (dof, at): (usize, &dyn Fn(usize) -> Target) = match target {
+        Target::OwnLine { axis, after, dof } => (dof, &move |dof| Target::OwnLine { axis, after, dof }),
+        Target::Axis { axis, after, dof } => (dof, &move |dof| Target::Axis { axis, after, dof }),
+        _ => return None,
+    };
+    let (to, way) = super::catalogue::axes::swept(dof, along)?;
+    Some((at(to), -way))
 }

@@ -1,8 +1,6 @@
 //! The searching half: touches in, findings out. It knows the machine and the plans, and nothing of what was planted.
 
-use axiscal::diag::source;
-use axiscal::diagnose::evidence::Evidence;
-use axiscal::diagnose::{Diagnosis, Options, Subject, diagnose, sketch};
+use axiscal::diagnose::{Diagnosis, Options, Subject, diagnose};
 use axiscal::fit::{Fit, Settings, identify_data};
 use axiscal::log::Touch;
 use axiscal::machine::Machine;
@@ -10,7 +8,7 @@ use axiscal::model::catalogue::Catalogue;
 use axiscal::model::data::{Data, Run, assemble};
 use axiscal::program::plan::Plan;
 
-pub const BASE: [&str; 4] = ["location-b", "location-c", "block-setup", "pretravel"];
+const BASE: [&str; 4] = ["location-b", "location-c", "block-setup", "pretravel"];
 
 pub fn data(machine: &Machine, plans: &[(Plan, f64)], touches: &[Vec<Touch>]) -> Data {
     let runs: Vec<Run> = plans
@@ -45,22 +43,3 @@ pub fn look(machine: &Machine, catalogue: &Catalogue, fit: &Fit, settings: &Sett
 
 /// Without the refit and the figures that only a reader needs.
 pub const LEAN: Options = Options { at_most: 3, refit: false, power: false, planned: None };
-
-/// RMS over noise with the sketched effect in the model; `None` where nothing can be sketched.
-pub fn sketched(machine: &Machine, built_in: &Catalogue, first: &Fit, settings: &Settings) -> Option<f64> {
-    let made = sketch::sketch(Subject { machine, catalogue: built_in, settings, fit: first }, &|id| built_in.knows(id))
-        .ok()?;
-    let mut own = Catalogue::built_in().unwrap();
-    own.add_file(&source("my-effects.toml", made.toml)).unwrap();
-    let mut more = settings.effects[BASE.len()..].to_vec();
-    more.push(made.id);
-    let after = fit(machine, &own, first.data.clone(), &more, None).0;
-    Some(reduced_rms(&after))
-}
-
-/// √(χ²/dof) in units of the noise of a touch.
-pub fn reduced_rms(fit: &Fit) -> f64 {
-    let evidence = Evidence::from_fit(fit);
-    let ss = evidence.base.project(&evidence.residual).norm_squared();
-    (ss / evidence.dof() as f64).sqrt() * fit.noise.sigma_mm * 1000.0
-}

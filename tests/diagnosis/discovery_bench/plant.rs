@@ -53,12 +53,6 @@ impl Bench {
         Self { visit_um, ..self }
     }
 
-    /// Hours that the runs take.
-    pub fn hours(&self) -> f64 {
-        let (plan, begins) = self.plans.last().unwrap();
-        (begins + plan.touches.last().unwrap().time_s.unwrap()) / 3600.0
-    }
-
     /// Every touch of all runs on a machine of which `wrong` says what is wrong (TOML of a scenario, without noise and
     /// clock). `own` is a file of effects that only the virtual machine knows.
     pub fn measure(&self, wrong: &str, own: &str, touch_um: f64, seed: u64) -> Vec<Vec<Touch>> {
