@@ -416,7 +416,8 @@ fn with_all_touches(subject: Subject, options: &Options) -> Result<Option<Diagno
         return Ok(None);
     }
     let mut answer = tested.answer()?;
-    if !answer.candidates.first().is_some_and(|c| c.proposed && explains(&fit, c.rms_after_um)) {
+    // by the noise of the touches that agree: what lies on a face in some repeats and not in others is no noise of the probe
+    if !answer.candidates.first().is_some_and(|c| c.proposed && explains(subject.fit, c.rms_after_um)) {
         return Ok(None);
     }
     answer.outliers = assemble_diagnosis::outliers(subject.fit);
