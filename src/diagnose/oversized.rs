@@ -41,8 +41,7 @@ pub struct Oversized {
     pub check: String,
 }
 
-/// Of a fit, those of the machine first, the largest in usual sizes first. A block may stand where it wants, within five times the tenths of a
-/// millimetre by which one is usually placed.
+/// Of a fit, those of the machine first, then where blocks stand; of each the largest in usual sizes first.
 pub(super) fn oversized(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> Vec<Oversized> {
     let find = |p: &Parameter| fit.model.unknowns.iter().find(|u| u.name == p.name && u.effect == p.effect);
     let identified = fit.outcome.parameters.iter().filter(|p| p.status == Status::Identified);

@@ -40,6 +40,7 @@ terms = [
 [[effect]]
 id = "own-plate"
 at = "workpiece"
+arm = "x"
 terms = [
   { parameter = "w1", unit = "um", dof = "dz", formula = "(px^2 + py^2)/1e4 + atan2(py, px) + pz/100" },
   { parameter = "w2", unit = "urad", dof = "rz", formula = "exp(-t/2)" },
@@ -113,18 +114,12 @@ id = "own-carriage"
 at = "X"
 about = "ball"
 arm = "z"
-terms = [
-  { parameter = "c1", unit = "um", dof = "dz", formula = "-({place}/300)^2 + X/500" },
-  { parameter = "c2", unit = "urad", dof = "ry", formula = "{place}/30 + sin(Y/90)" },
-]
+terms = [ { parameter = "c1", unit = "um", dof = "dz", formula = "X/500" }, { parameter = "c2", unit = "urad", dof = "ry", formula = "{place}/30 + sin(Y/90)" } ]
 [[effect]]
 id = "own-bearing"
 at = "C"
 arm = "y"
-terms = [
-  { parameter = "d1", unit = "urad", dof = "rx", formula = "cos(3*C)" },
-  { parameter = "d2", unit = "urad", dof = "rz", formula = "sin(2*C)" },
-]
+terms = [ { parameter = "d1", unit = "urad", dof = "rx", formula = "cos(3*C)" }, { parameter = "d2", unit = "urad", dof = "rz", formula = "sin(2*C)" } ]
 "#;
 
 fn values(effect: &Effect, n_sets: usize, rng: &mut ChaCha8Rng) -> Vec<f64> {

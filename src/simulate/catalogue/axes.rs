@@ -196,23 +196,27 @@ pub(super) fn about_a_point(
     for turn in &mut turns {
         let Role::Amount(acts) = &mut turn.role else { continue };
         let Some(&(target, shape, factor)) = acts.first() else { continue };
-        let (dof, at): (usize, &dyn Fn(usize) -> Target) = match target {
-            Target::OwnLine { axis, after, dof } => (dof, &move |dof| Target::OwnLine { axis, after, dof }),
-            Target::Axis { axis, after, dof } => (dof, &move |dof| Target::Axis { axis, after, dof }),
-            _ => continue,
-        };
-        // the point itself stays where it is
-        let Some((to, way)) = swept(dof, along) else { continue };
-        acts.push((at(to), shape, -factor * way * arm));
+        let Some((to, by)) = shift_of_a_turn(target, along) else { continue };
+        acts.push((to, shape, factor * by * arm));
     }
     turns.push(Parameter::signed_setting(&name, Mm).alias("arm"));
     turns
 }
 
-/// Which way a turn (3, 4, 5: about x, y, z) takes what lies along x, y or z (0, 1, 2). rx: y goes to z and z to -y; ry: z to x, x to -z;
-/// rz: x to y, y to -x.
-pub(in crate::simulate) fn swept(dof: usize, along: usize) -> Option<(usize, f64)> {
-    Some(match (dof, along) {
+/// A turn about a point so far along x, y or z (0, 1, 2) also shifts what it turns: where, and by how much of turn and distance. The point
+/// itself stays where it is.
+pub(in crate::simulate) fn shift_of_a_turn(target: Target, along: usize) -> Option<(Target, f64)> {
+    let (dof, at): (usize, &dyn Fn(usize) -> Target) = match target {
+        Target::OwnLine { axis, after, dof } => (dof, &move |dof| Target::OwnLine { axis, after, dof }),
+        Target::Axis { axis, after, dof } => (dof, &move |dof| Target::Axis { axis, after, dof }),
+        Target::Base(dof) => (dof, &Target::Base),
+        Target::Tool(dof) => (dof, &Target::Tool),
+        Target::Workpiece(dof) => (dof, &Target::Workpiece),
+        Target::Block(dof) => (dof, &Target::Block),
+        _ => return None,
+    };
+    // rx (3): y goes to z and z to -y; ry: z to x, x to -z; rz: x to y, y to -x
+    let (to, way) = match (dof, along) {
         (3, 1) => (2, 1.0),
         (3, 2) => (1, -1.0),
         (4, 2) => (0, 1.0),
@@ -220,7 +224,8 @@ pub(in crate::simulate) fn swept(dof: usize, along: usize) -> Option<(usize, f64
         (5, 0) => (1, 1.0),
         (5, 1) => (0, -1.0),
         _ => return None,
-    })
+    };
+    Some((at(to), -way))
 }
 
 /// A carriage on a guideway that is bowed upwards: at q from its middle it is lower by (q/300)² of the sag, and it leans

@@ -295,7 +295,7 @@ impl Reader<'_> {
             if let (Some(parameter), Some(target), Some(formula)) = (parameter, target, formula) {
                 let target = self.on_own_line(target, &formula, row.about);
                 if let Some((name, along)) = &arm {
-                    acts.extend(shift_of_a_turn(target, *along).and_then(|(to, by)| {
+                    acts.extend(super::catalogue::axes::shift_of_a_turn(target, *along).and_then(|(to, by)| {
                         let text = format!("({})*{name}", term.formula.get_ref());
                         let formula = Formula::read(&self.placed(row, &text)?, &names).ok()?;
                         Some((parameter, to, formula, by))
@@ -403,16 +403,4 @@ impl Reader<'_> {
         }
         target
     }
-}
-
-/// A turn about a point so far along x, y or z (0, 1, 2) also shifts what it turns: where, and by how much of turn and distance. The point
-/// itself stays where it is.
-fn shift_of_a_turn(target: Target, along: usize) -> Option<(Target, f64)> {
-    let (dof, at): (usize, &dyn Fn(usize) -> Target) = match target {
-        Target::OwnLine { axis, after, dof } => (dof, &move |dof| Target::OwnLine { axis, after, dof }),
-        Target::Axis { axis, after, dof } => (dof, &move |dof| Target::Axis { axis, after, dof }),
-        _ => return None,
-    };
-    let (to, way) = super::catalogue::axes::swept(dof, along)?;
-    Some((at(to), -way))
 }
