@@ -39,6 +39,9 @@ pub struct Diagnosis {
     pub all_touches: Option<AllTouches>,
     /// Standard deviation of a touch, µm.
     pub noise_um: f64,
+    /// The probe's declared repeatability, µm, where repeats scatter by far more: what makes them scatter counts as noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub declared_noise_um: Option<f64>,
     /// Scatter of index visits that the tests allow for, µm.
     pub visit_um: f64,
     /// Where the scatter of index positions comes from.

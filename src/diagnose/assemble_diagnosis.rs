@@ -237,6 +237,7 @@ pub(super) fn put_together(
         held_out_se_um: folds.model().and_then(|h| h.standard_error_um),
         all_touches: None,
         noise_um: noise_um(fit),
+        declared_noise_um: fit.noise.repeats_beyond_mm.map(um_from_mm),
         visit_um: um_from_mm(seen.evidence.tau_mm),
         visit_source: fit.noise.visit_source,
         noise_says: noise_says(seen, fit),

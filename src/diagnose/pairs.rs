@@ -17,12 +17,8 @@ pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision) ->
     }
     let search = &seen.search;
     let pair = better_than_one(search)?;
-    if decision.confirmed {
-        // the first effect of two is found by itself, and the other one after it
-        let leader: &Group = seen.groups.first()?;
-        if leader.holds(pair.first) || leader.holds(pair.second) {
-            return None;
-        }
+    if decision.confirmed && is_found_alone(&pair, &seen.groups) {
+        return None;
     }
     // a pattern without a name that says it with less is no pair of names
     if seen.patterns.leading_shape().is_some_and(|shape| seen.patterns.bic(shape) < pair.bic) {
@@ -40,6 +36,11 @@ pub(super) fn both(subject: Subject, seen: &Examination, decision: &Decision) ->
     library.push("both", Origin::Catalogue, &joint);
     let held = held_out(search.question, &library, &seen.evidence.visits, Choice::Given(0));
     bears_out(&held).then_some(pair)
+}
+
+/// The first effect of two is found by itself, and the other one after it.
+fn is_found_alone(pair: &Pair, groups: &[Group]) -> bool {
+    groups.first().is_some_and(|leader| leader.holds(pair.first) || leader.holds(pair.second))
 }
 
 /// Two criteria that differ by less are equal: the two effects are then one effect in parts.
@@ -121,6 +122,32 @@ mod tests {
                 let by = search.bic(2) - pair.bic;
                 assert!((by - more as f64 * (ROWS as f64).ln()).abs() < 0.3, "{more} more columns: {by}");
             }
+        }
+    }
+
+    /// A leader that held-out touches confirm is named alone where it is one of the pair; where it is another effect, that looks like
+    /// both together, the pair is named though it has more parameters.
+    #[test]
+    fn a_confirmed_leader_keeps_its_name_only_as_one_of_the_pair() {
+        let mut rng = rng(44);
+        let columns = noise_matrix(&mut rng, ROWS, 6);
+        let base = Basis::new(&columns.columns(4, 2).into_owned());
+        let noise = noise_matrix(&mut rng, ROWS, 1).column(0).into_owned();
+        for (second, alone) in [(0.2, true), (0.8, false)] {
+            let act = columns.column(0) + columns.column(1) * second;
+            let mut library = Library::new(ROWS);
+            library.push("c0", Origin::Catalogue, &columns.columns(0, 1).into_owned());
+            library.push("c1", Origin::Catalogue, &columns.columns(1, 1).into_owned());
+            // one parameter, and nearly what both do together where the second is strong
+            let alike = columns.column(0) + columns.column(1) * 0.6;
+            library.push("like both", Origin::Catalogue, &DMatrix::from_columns(&[alike]));
+            let residual = base.project(&(&noise * 0.1 - act));
+            let search = Search::new(Question { residual: &residual, base: &base, pure: None }, &library);
+            let pair = better_than_one(&search).unwrap();
+            assert_eq!([pair.first.min(pair.second), pair.first.max(pair.second)], [0, 1]);
+            let groups = search.groups(8);
+            assert_eq!(groups[0].first(), if alone { 0 } else { 2 }, "{groups:?}");
+            assert_eq!(is_found_alone(&pair, &groups), alone, "{groups:?}");
         }
     }
 

@@ -19,8 +19,8 @@ const LEAST_REPEATS: usize = 8;
 const LEVEL: f64 = 1e-3;
 const TENTH: f64 = 1.1;
 
-/// Index visits that scatter by so many times what the axes declare hold something else, if chance makes it as seldom. A
-/// declared repeatability is a rough figure: less is no matter.
+/// Repeats or index visits that scatter by so many times what the probe or the axes declare hold something else, if chance makes it
+/// as seldom. A declared repeatability is a rough figure: less is no matter.
 const BEYOND: f64 = 2.0;
 
 /// Fewer contrasts than this say too little about visits.
@@ -54,6 +54,9 @@ pub struct Noise {
     pub later_mm: Option<f64>,
     /// What repeats say where there are enough of them, whatever σ is taken: standard deviation, mm, and degrees of freedom.
     pub repeats: Option<(f64, f64)>,
+    /// The probe's declared repeatability, mm, where repeats scatter by far more: σ, which they give, may hold what lies on a face in
+    /// one repeat and not in the next.
+    pub repeats_beyond_mm: Option<f64>,
     /// σ as the user states it, mm, where the repeats contradict it and are taken in its place.
     pub contradicted_mm: Option<f64>,
     /// What revisited poses say of τ where they contradict what the user states: the stated one, the one that they show, mm, and its
@@ -146,6 +149,9 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         None => fixed(known.declared_tau_mm, VisitSource::Declared),
     };
     let repeats = from_repeats.map(|found| (found, dof as f64));
+    // with the fewest repeats that count chance makes so much once in ten thousand
+    let repeats_beyond_mm = Some(rounding.added_to(known.declared_sigma_mm))
+        .filter(|declared| source == NoiseSource::Repeats && *declared > 0.0 && sigma_mm > BEYOND * declared);
     let visits_contradict = known.stated_tau_mm.filter(|_| enough).and_then(|stated| {
         let (found, found_dof, _) = revisits.solve(sigma_mm);
         // what changes between the visits and is no noise makes them scatter, too
@@ -171,6 +177,7 @@ pub fn estimate(samples: &[Sample], known: &Known, followed: Option<&Followed>) 
         tau_fold_mm,
         later_mm,
         repeats,
+        repeats_beyond_mm,
         contradicted_mm,
         visits_contradict,
         visits_beyond_mm,
@@ -245,6 +252,11 @@ impl Noise {
         let own2 = self.sigma_mm * self.sigma_mm - self.rounding_mm * self.rounding_mm;
         [
             of_touch.map(|(stated_mm, (found_mm, dof))| Remark::NoiseContradicted { stated_mm, found_mm, dof }),
+            self.repeats_beyond_mm.map(|declared_mm| Remark::RepeatsBeyond {
+                sigma_mm: self.sigma_mm,
+                dof: self.dof.unwrap_or(0.0),
+                declared_mm,
+            }),
             of_visits.map(|(stated_mm, found_mm, dof)| Remark::VisitsContradicted { stated_mm, found_mm, dof }),
             self.visits_beyond_mm.map(|declared_mm| Remark::VisitsBeyond {
                 tau_mm: self.tau_mm,
@@ -405,6 +417,22 @@ mod tests {
         let noise = estimate(&samples, &known(), None);
         assert_eq!((noise.sigma_mm, noise.source), (5.0, NoiseSource::Declared));
         assert!((noise.coverage(0.5) - 1.96).abs() < 1e-3);
+    }
+
+    /// A chip that lies on some repeats makes them scatter: that is said above twice what is declared. Not where the study states the
+    /// noise, and not of few repeats.
+    #[test]
+    fn repeats_that_scatter_by_far_more_than_declared_are_said() {
+        let pairs = |half_mm: f64, n: usize| -> Vec<Sample> {
+            (0..2 * n).map(|i| sample(if i.is_multiple_of(2) { half_mm } else { -half_mm }, i / 2)).collect()
+        };
+        for (half_mm, n, said) in [(3e-3, 20, true), (1.3e-3, 20, false), (3e-3, 7, false)] {
+            let known = Known { declared_sigma_mm: 1e-3, ..Known::default() };
+            let noise = estimate(&pairs(half_mm, n), &known, None);
+            assert_eq!(noise.repeats_beyond_mm, said.then_some(1e-3), "{half_mm} {n}: {noise:?}");
+            let stated = Known { stated_sigma_mm: Some(5e-3), ..known };
+            assert_eq!(estimate(&pairs(half_mm, n), &stated, None).repeats_beyond_mm, None);
+        }
     }
 
     /// Four poses, each visited twice, twelve points each: τ and its bound over many draws.

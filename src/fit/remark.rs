@@ -154,6 +154,8 @@ pub enum Remark {
     VisitsContradicted { stated_mm: f64, found_mm: f64, dof: f64 },
     /// Index positions scatter by far more than the axes declare.
     VisitsBeyond { tau_mm: f64, dof: f64, declared_mm: f64 },
+    /// Repeats scatter by far more than the probe's file declares.
+    RepeatsBeyond { sigma_mm: f64, dof: f64, declared_mm: f64 },
     /// The last digit of the log takes away more than the noise.
     CoarseLog { rounding_mm: f64 },
     /// The touches scatter by far less than a noise that no repeats confirm.
@@ -199,7 +201,10 @@ impl Remark {
             | Self::NotDetermined { .. }
             | Self::FollowsUnseen { .. }
             | Self::NoTemperature { .. } => 4,
-            Self::VisitsBeyond { .. } | Self::CoarseLog { .. } | Self::NoiseTooLarge { .. } => 5,
+            Self::RepeatsBeyond { .. }
+            | Self::VisitsBeyond { .. }
+            | Self::CoarseLog { .. }
+            | Self::NoiseTooLarge { .. } => 5,
             Self::TemperatureGap(_)
             | Self::UnmodelledNotCounted { .. }
             | Self::TypeBPerKelvin { .. }

@@ -18,6 +18,14 @@ pub(crate) fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
     if d.verdict != Verdict::Adequate {
         out.extend(d.proposed().iter().flat_map(of_candidate));
     }
+    out.extend(d.declared_noise_um.map(|declared_um| {
+        let part = if d.proposed().is_empty() { "" } else { " What is named may be only a part of what is wrong." };
+        format!(
+            "repeated touches scatter by {} µm, and the probe is declared with {} µm: chips, dirt or a loose stylus count as noise here.{part} Clean the ball and the faces, fasten the stylus and measure again",
+            significant(d.noise_um),
+            significant(declared_um)
+        )
+    }));
     for g in d.gross.iter().take(3) {
         let share = |share: f64| format!("{:.0} %", 100.0 * share);
         out.push(match (g.in_place, g.agrees) {

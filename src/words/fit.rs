@@ -144,6 +144,11 @@ pub(crate) fn remark(remark: &Remark) -> String {
             degrees(*dof),
             um(*declared_mm)
         ),
+        Remark::RepeatsBeyond { sigma_mm, dof, declared_mm } => format!(
+            "Repeated touches scatter by {:.2} µm ({dof:.0} degrees of freedom); the machine's file declares a probe repeatability of {:.2} µm. Chips, dirt or a loose stylus count as noise here: chi2/dof does not show them. Clean the ball and the faces, fasten the stylus and measure again, or declare what your probe repeats to (repeatability_um in machines.toml).",
+            um(*sigma_mm),
+            um(*declared_mm)
+        ),
         Remark::CoarseLog { rounding_mm } => format!(
             "The digits of the log take away {:.2} µm, more than the touches' own noise. The same is lost wherever a point is touched again: uncertainties may be too small, and patterns may appear that do not exist. Let the program write more decimals.",
             um(*rounding_mm)

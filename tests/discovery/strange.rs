@@ -41,8 +41,8 @@ pub struct Seen {
     pub depends: Vec<String>,
     pub rejected: usize,
     pub proposed: Option<String>,
-    /// Said as the whole answer: proposed, separated from all others, no shape is better, and nothing else is missing. Of these kinds every
-    /// name is wrong, or a part of what acts.
+    /// Said as the whole answer: proposed, separated from all others, no shape is better, nothing else is missing, and the repeats do not
+    /// say that a part of what acts may count as noise. Of these kinds every name is wrong, or a part of what acts.
     pub bare: bool,
     /// Reduced RMS with the sketched formula, where the kind has one.
     pub sketched: Option<f64>,
@@ -89,6 +89,7 @@ fn one(bench: &Bench, kind: usize, rng: &mut ChaCha8Rng) -> Seen {
         rejected: d.outliers.len(),
         proposed: d.candidates.first().filter(|c| c.proposed).map(|c| c.effect.clone()),
         bare: d.verdict == Verdict::MissingEffect(Missing::Effect(None))
+            && d.declared_noise_um.is_none()
             && d.candidates.first().is_some_and(|c| c.proposed && c.same_as.is_empty() && c.remains != Some(true)),
         sketched: if KINDS[kind].2 { sketched(bench, &fit, &settings) } else { None },
     }

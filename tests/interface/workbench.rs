@@ -8,25 +8,39 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
+fn call(words: &[&str]) {
+    assert_cmd::Command::new(env!("CARGO_BIN_EXE_axiscal")).args(words).assert().success();
+}
+
+/// A program of the swivel head with its log, by the machine of `wrong.toml` in the folder.
+fn run(dir: &Path, program: &str) {
+    let at = |name: &str| dir.join(name).display().to_string();
+    let [plan, log] = ["plan.json", "log"].map(|end| at(&format!("{program}.{end}")));
+    call(&["generate", "--machine", "swivel-head", "--program", program, "--controller", "linuxcnc", "--out", &at("")]);
+    call(&[
+        "simulate",
+        "--plan",
+        &plan,
+        "--machine",
+        "swivel-head",
+        "--scenario",
+        &at("wrong.toml"),
+        "--controller",
+        "linuxcnc",
+        "--out",
+        &log,
+    ]);
+}
+
 /// A measured machine with an error that no model of it holds, made once.
 pub fn measured() -> &'static Path {
     static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
     MADE.get_or_init(|| {
         let dir = tempfile::tempdir().unwrap();
         let at = |name: &str| dir.path().join(name).display().to_string();
-        let call = |words: &[&str]| {
-            assert_cmd::Command::new(env!("CARGO_BIN_EXE_axiscal")).args(words).assert().success();
-        };
-        std::fs::write(
-            at("wrong.toml"),
-            "seed = 3\n[effects.location-b]\nEX0B = 0.02\n[effects.squareness-xy]\nEC0Y = 400\n[noise]\ntouch_um = 0.5\n",
-        )
-        .unwrap();
-        call(&["generate", "--machine", "swivel-head", "--program", "head", "--controller", "linuxcnc", "--out", &at("")]);
-        call(&[
-            "simulate", "--plan", &at("head.plan.json"), "--machine", "swivel-head", "--scenario", &at("wrong.toml"),
-            "--controller", "linuxcnc", "--out", &at("head.log"),
-        ]);
+        let wrong = "seed = 3\n[effects.location-b]\nEX0B = 0.02\n[effects.squareness-xy]\nEC0Y = 400\n[noise]\ntouch_um = 0.5\n";
+        std::fs::write(at("wrong.toml"), wrong).unwrap();
+        run(dir.path(), "head");
         call(&[
             "new", "--machine", "swivel-head", "--plan", &at("head.plan.json"), "--log", &at("head.log"),
             "--effects", "location-b,pretravel", "--known-blocks", "--out", &at("study.toml"),
@@ -395,5 +409,41 @@ fn an_effect_that_changes_on_the_disk_is_fitted_anew() {
         }
         assert!(began.elapsed() < Duration::from_secs(20), "the change is not seen");
         std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// `plan-next` of the page asks about what each step of the page may have added wrongly, and not only about the last one.
+#[test]
+fn the_next_program_asks_about_every_step_of_the_page() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name).display().to_string();
+    let wrong =
+        "seed = 5\n[effects.backlash-y]\nbacklash_Y = 6.0\n[effects.scale-z]\nEZZ = 80.0\n[noise]\ntouch_um = 1.0\n";
+    std::fs::write(at("wrong.toml"), wrong).unwrap();
+    let mut new = vec!["new".to_owned(), "--machine".to_owned(), "swivel-head".to_owned()];
+    for program in ["head", "table"] {
+        run(dir.path(), program);
+        new.extend(["--plan".to_owned(), at(&format!("{program}.plan.json"))]);
+        new.extend(["--log".to_owned(), at(&format!("{program}.log"))]);
+    }
+    new.extend(["--out".to_owned(), at("study.toml")]);
+    call(&new.iter().map(String::as_str).collect::<Vec<_>>());
+    let w = Workbench::open(dir.path());
+    for effect in ["backlash-y", "scale-z"] {
+        assert_eq!(w.switch(effect, true).status, 200);
+    }
+    let asked = json!({ "version": w.version(), "verb": "plan-next", "controller": "linuxcnc", "minutes": 10 });
+    assert_eq!(w.post("/api/call", &asked.to_string()).status, 202);
+    let mut answered = Value::Null;
+    until("the next program", || {
+        let job = w.get("/api/state").json()["job"].clone();
+        assert_eq!(job["failed"], json!([]), "{job}");
+        answered = job["answered"].clone();
+        !answered.is_null()
+    });
+    assert_eq!(answered["code"], 0, "{answered}");
+    let pairs = answered["answer"]["pairs"].as_array().unwrap();
+    for id in ["backlash-x", "scale-z"] {
+        assert!(pairs.iter().any(|pair| pair["one"] == id || pair["other"] == id), "{id}: {answered}");
     }
 }

@@ -328,6 +328,21 @@ fn an_effect_that_hides_in_the_scatter_of_visits_is_said() {
     }
 }
 
+/// A probe that repeats far worse than its file declares: what makes it so counts as noise, and is said.
+#[test]
+fn repeats_that_scatter_far_more_than_declared_are_said() {
+    let machine = machine("swivel-head");
+    let plan = plan(&machine, "full");
+    let declared_um = machine.probe.repeatability_um;
+    for (times, more) in [(1.0, false), (1.5, false), (3.0, true)] {
+        let text = format!("seed = 5\n[noise]\ntouch_um = {:?}\n", times * declared_um);
+        let touches = touch(&machine, &plan, &scenario(&machine, &text), None);
+        let fit = fitted(&machine, &plan, &touches, &settings(&machine, &[]));
+        let said = fit.remarks.iter().any(|r| matches!(r, axiscal::fit::Remark::RepeatsBeyond { .. }));
+        assert_eq!(said, more, "{times}: {:?}", fit.outcome.warnings);
+    }
+}
+
 /// Hours count from the first touch that was made, in whatever order a study lists its runs.
 #[test]
 fn runs_may_be_listed_in_any_order() {
