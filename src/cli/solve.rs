@@ -10,7 +10,7 @@ use crate::diagnose::answer::{Candidate, Diagnosis};
 use crate::diagnose::solving::{Added, Change, Ending, Host, Refusal, State, Stop, Visited, Why};
 use crate::fit::Fit;
 use crate::fit::outcome::{Outcome, Parameter};
-use crate::report::fit::{digits, first_remarks, significant, with_unit};
+use crate::report::fit::{digits, first_remarks, per_dof, significant, with_unit};
 use crate::search::groups::PLAUSIBLE;
 use crate::words::diagnose::{list, machine_check, one_of};
 use crate::words::diagnosis_remarks::wrong_sign;
@@ -116,11 +116,11 @@ impl Host for Terminal<'_> {
     fn looked(&mut self, state: &State, added: &[Added]) -> Result<()> {
         let (o, found) = (&state.fit.outcome, &state.found);
         self.io.say(format!(
-            "--- step {}: residual {} µm RMS, noise {} µm, chi2/dof {:.2}{}",
+            "--- step {}: residual {} µm RMS, noise {} µm, chi2/dof {}{}",
             added.len() + 1,
             significant(o.rms_um),
             significant(o.noise_um),
-            o.chi2_per_dof,
+            per_dof(o.chi2_per_dof, 2),
             cross_validated(found)
         ));
         self.io.say(&found.says);

@@ -1,6 +1,6 @@
 //! A comparison as tables and plots, and as CSV.
 
-use super::fit::{number, significant, table};
+use super::fit::{number, per_dof, significant, table};
 use super::lay::lay;
 use super::plot::{Paper, scatter};
 use crate::compare::{Comparison, Split};
@@ -20,12 +20,12 @@ pub fn comparison(c: &Comparison, paper: Paper, all: bool) -> String {
         n => format!(" ({n} more cannot be used)"),
     };
     let mut out = format!(
-        "{}: residual {} µm RMS over {} touches{missed}, noise {} µm; chi2/dof {:.2}",
+        "{}: residual {} µm RMS over {} touches{missed}, noise {} µm; chi2/dof {}",
         c.machine,
         significant(c.rms_um),
         c.points.iter().filter(|p| p.used).count(),
         significant(c.noise_um),
-        c.chi2_per_dof
+        per_dof(c.chi2_per_dof, 2)
     );
     out += &c.held_out_rms_um.map_or_else(String::new, |h| format!("; cross-validated {} µm", significant(h)));
     let noise = super::prose::sentence(&format!("noise: {}", c.noise_says), paper.width, 0, 2);

@@ -146,15 +146,20 @@ fn answer(o: &Outcome, results: &[&Parameter]) -> String {
     out
 }
 
+/// chi2/dof; with as many unknowns as touches there is none.
+pub(crate) fn per_dof(chi2_per_dof: f64, decimals: usize) -> String {
+    if chi2_per_dof.is_nan() { "-".to_owned() } else { format!("{chi2_per_dof:.decimals$}") }
+}
+
 fn fit_details(o: &Outcome) -> String {
     format!(
-        "{} unknown{}, rank {}, {} degrees of freedom, condition {:.1}, chi2/dof {:.3}\nnoise: {}\n{} after {} steps: {}\n",
+        "{} unknown{}, rank {}, {} degrees of freedom, condition {:.1}, chi2/dof {}\nnoise: {}\n{} after {} steps: {}\n",
         o.unknowns,
         if o.unknowns == 1 { "" } else { "s" },
         o.rank,
         o.dof,
         o.condition,
-        o.chi2_per_dof,
+        per_dof(o.chi2_per_dof, 3),
         o.noise_says,
         if o.converged { "converged" } else { "NOT converged" },
         o.iterations,

@@ -1,6 +1,6 @@
 //! A changed model, the ladder of models, and two studies side by side.
 
-use super::fit::{digits, number, significant, table};
+use super::fit::{digits, number, per_dof, significant, table};
 use super::lay::lay;
 use super::plot::{Paper, line};
 use super::prose::sentence;
@@ -70,7 +70,7 @@ pub fn change(
     if later.0.is_some() || later.1.is_some() {
         row("on the last run, µm RMS", or_dash(later.0), or_dash(later.1));
     }
-    row("chi2/dof", format!("{:.3}", before.chi2_per_dof), format!("{:.3}", after.chi2_per_dof));
+    row("chi2/dof", per_dof(before.chi2_per_dof, 3), per_dof(after.chi2_per_dof, 3));
     row("unknowns", before.unknowns.to_string(), after.unknowns.to_string());
     for p in &c.kept {
         let unit = &p.unit;
@@ -162,7 +162,7 @@ pub fn history(h: &History, paper: Paper) -> String {
             number(significant(s.rms_um)),
             number(with_error(s.held_out_rms_um, s.held_out_se_um)),
             number(or_dash(s.later_run_rms_um)),
-            number(format!("{:.3}", s.chi2_per_dof)),
+            number(per_dof(s.chi2_per_dof, 3)),
         ];
         if nested {
             row.insert(4, number(or_dash(s.nested_rms_um)));

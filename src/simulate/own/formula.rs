@@ -7,7 +7,7 @@ use crate::simulate::terms::TouchState;
 /// Words for the state of a touch, as messages list them.
 pub const STATE_WORDS: &str = "X Y Z A B C t T nx ny nz mx my mz sX sY sZ sA sB sC feed S gx gy gz L L0 bx by bz px py pz \
     ox oy oz edge wA wB wC wayA wayB wayC speed1 on1 off1 speed2 on2 off2 \
-    speed3 on3 off3 speed4 on4 off4";
+    speed3 on3 off3 speed4 on4 off4 hx hy hz";
 
 /// Functions, as messages list them.
 pub const FUNCTION_WORDS: &str = "sin cos tan asin acos atan atan2 exp ln sqrt abs sign floor mod step";
@@ -441,6 +441,17 @@ mod tests {
         let joints = Position([10.0, 20.0, 30.0, 0.0, 90.0, 0.0]);
         let formula = Formula::read(text, &["tau".to_owned()]).unwrap();
         formula.with(&[0.25], None).value(&touch, &joints)
+    }
+
+    /// What a message lists, and what no parameter may be called, is what a formula knows.
+    #[test]
+    fn the_words_of_the_state_are_those_that_are_read() {
+        let listed: Vec<&str> = STATE_WORDS.split_whitespace().collect();
+        assert!(listed.iter().all(|word| Word::parse(word, &[]).is_some()));
+        let letters = ('a'..='z').chain('A'..='Z').chain('0'..='9');
+        let short = letters.clone().flat_map(|a| letters.clone().map(move |b| format!("{a}{b}")));
+        let known: Vec<String> = short.filter(|word| Word::parse(word, &[]).is_some()).collect();
+        assert!(known.len() > 20 && known.iter().all(|word| listed.contains(&word.as_str())), "{known:?}");
     }
 
     #[test]
