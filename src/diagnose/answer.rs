@@ -44,6 +44,9 @@ pub struct Diagnosis {
     pub declared_noise_um: Option<f64>,
     /// Scatter of index visits that the tests allow for, µm.
     pub visit_um: f64,
+    /// What the axes declare, µm, where the residuals make the tests allow for far more: an effect may be hidden in it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub declared_visit_um: Option<f64>,
     /// Where the scatter of index positions comes from.
     pub visit_source: VisitSource,
     /// Noise and scatter of visits with their sources, in a sentence.
@@ -277,6 +280,14 @@ pub struct Parameter {
     pub unit: String,
     /// Standard uncertainty; null for a value that was picked from a scan.
     pub sigma: Option<f64>,
+}
+
+impl Candidate {
+    /// Are its sizes those beside one value of a shape that was scanned?
+    #[must_use]
+    pub fn is_beside_a_shape(&self) -> bool {
+        self.parameters.iter().any(|p| p.sigma.is_none())
+    }
 }
 
 /// A parameter that an added effect makes less certain.

@@ -7,8 +7,8 @@ use super::first_order::FirstOrder;
 use super::folds::Folds;
 use super::next_step::MachineCheck;
 use super::{Examination, Subject, noise_um, other_causes, separating_touches, setup_mistakes};
-use crate::fit::Fit;
 use crate::fit::candidates::NoValue;
+use crate::fit::{Fit, VisitSource, declared_tau_mm};
 use crate::model::data::Origin;
 use crate::search::dependence::Dependence;
 use crate::search::groups::Group;
@@ -239,6 +239,7 @@ pub(super) fn put_together(
         noise_um: noise_um(fit),
         declared_noise_um: fit.noise.repeats_beyond_mm.map(um_from_mm),
         visit_um: um_from_mm(seen.evidence.tau_mm),
+        declared_visit_um: hidden_in_scatter(subject, seen).map(um_from_mm),
         visit_source: fit.noise.visit_source,
         noise_says: noise_says(seen, fit),
         lack_of_fit_p: seen.lack_of_fit.p,
@@ -260,6 +261,16 @@ pub(super) fn put_together(
         warnings: seen.named.left_out.iter().map(NoValue::left_out).collect(),
         open,
     }
+}
+
+/// The declared scatter of index positions, mm, where no revisits measure it and the tests allow for so much more that an effect may
+/// be hidden in it.
+fn hidden_in_scatter(subject: Subject, seen: &Examination) -> Option<f64> {
+    const TIMES: f64 = 2.0;
+    let fit = subject.fit;
+    let declared_mm = declared_tau_mm(subject.machine, &fit.data.observations);
+    let far = declared_mm > 0.0 && seen.evidence.tau_mm > TIMES * declared_mm;
+    (fit.noise.visit_source == VisitSource::Declared && far).then_some(declared_mm)
 }
 
 /// Unit of what a misfit is drawn against.
@@ -429,10 +440,7 @@ fn candidate(
             let odd = super::odd_block::odd_block(&seen.named.columns[chosen], score.estimate.as_slice());
             words::differences_of_blocks(&effect.says, odd.as_ref())
         }
-        some => {
-            let says = effect.says.trim_end_matches('.');
-            format!("{says}. Its {} cannot be determined with this plan", words::list(some))
-        }
+        some => words::without_sizes(&effect.says, some),
     };
     if let Some(scanned) = &seen.named.scanned[chosen] {
         parameters.push(Parameter {
@@ -494,6 +502,29 @@ fn candidate(
     }
 }
 
+/// Sizes of an effect with a shape that was scanned, from the fit with it: beside one value of the shape they would look surer than
+/// they are.
+pub(super) fn sizes_of_refit(candidate: &mut Candidate, again: &Fit) {
+    if !candidate.is_beside_a_shape() {
+        return;
+    }
+    let mut lost = Vec::new();
+    for mut p in std::mem::take(&mut candidate.parameters) {
+        match again.outcome.parameters.iter().find(|fitted| fitted.name == p.name) {
+            Some(fitted) if fitted.sigma.is_some() => {
+                (p.value, p.sigma) = (fitted.value, fitted.sigma);
+                candidate.parameters.push(p);
+            }
+            Some(_) if p.sigma.is_some() => lost.push(p.name),
+            _ => candidate.parameters.push(p),
+        }
+    }
+    if !lost.is_empty() {
+        candidate.says = words::without_sizes(&candidate.says, &lost);
+        candidate.not_told.extend(lost);
+    }
+}
+
 /// By how much an effect of the expected size moves the touch that it moves most, with its standard uncertainty, µm: told
 /// where its parameters are not told one by one.
 fn moves(seen: &Examination, score: &Score, raw_um: &DMatrix<f64>) -> Option<(f64, f64)> {
@@ -545,7 +576,6 @@ fn weakened(fit: &Fit, first_order: &FirstOrder, raw_mm: &DMatrix<f64>) -> Vec<W
     out
 }
 
-/// Touches that are used again with the first candidate in the model.
 /// Outliers of a fit.
 pub(super) fn outliers(fit: &Fit) -> Vec<Outlier> {
     let each = fit.rejected.iter().filter(|(_, reason)| reason.is_outlier()).map(|(&i, reason)| {
@@ -556,6 +586,7 @@ pub(super) fn outliers(fit: &Fit) -> Vec<Outlier> {
     each.collect()
 }
 
+/// Outliers that are used again with the first candidate in the model.
 pub(super) fn outliers_again(out: &mut Diagnosis, before: &Fit, after: &Fit) {
     for (&i, _) in before.rejected.iter().filter(|(i, _)| after.weight[**i] > 0.0) {
         let o = &before.data.observations[i];

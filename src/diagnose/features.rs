@@ -146,7 +146,7 @@ pub fn direction_words(name: &str, machine: &Machine) -> String {
         Some(("machine", axis)) => format!("in {axis} of the machine"),
         Some(("table", axis)) => {
             let turns = machine.axes.iter().any(|a| a.name.is_rotary() && a.side == Side::Workpiece);
-            if turns { format!("in the rotating table's {axis}") } else { format!("in {axis} of the table") }
+            if turns { format!("in {axis} of what carries the block") } else { format!("in {axis} of the table") }
         }
         Some(("turn", axis)) => format!("as a turn about {axis}"),
         Some(("tilt", which)) => {

@@ -376,7 +376,16 @@ impl<'a> Tested<'a> {
             };
             if first.proposed {
                 first.remains = remains.or_else(|| Some(still_fails(&again, machine, catalogue)));
-                out.candidates.iter_mut().filter(|c| c.proposed).for_each(|c| c.rms_after_um = again.outcome.rms_um);
+                let mut proposed: Vec<&mut answer::Candidate> =
+                    out.candidates.iter_mut().filter(|c| c.proposed).collect();
+                proposed.iter_mut().for_each(|c| c.rms_after_um = again.outcome.rms_um);
+                if proposed.iter().any(|c| c.is_beside_a_shape()) {
+                    let names: Vec<&str> = proposed.iter().map(|c| &*c.effect).collect();
+                    let settings = Settings { quick: false, bare: true, ..settings_with(subject, &names) };
+                    if let Ok(whole) = identify_beside(&again, machine, catalogue, &settings) {
+                        proposed.iter_mut().for_each(|c| assemble_diagnosis::sizes_of_refit(c, &whole));
+                    }
+                }
             }
             assemble_diagnosis::outliers_again(&mut out, fit, &again);
         }

@@ -452,6 +452,12 @@ fn harmonic(d: &Dependence) -> String {
     if form(d) == "order" { turns(d.scanned) } else { "smoothly over the turn".to_owned() }
 }
 
+/// What an effect is, and which of its parameters have no size.
+#[must_use]
+pub fn without_sizes(says: &str, names: &[String]) -> String {
+    format!("{}. Its {} cannot be determined with this plan", says.trim_end_matches('.'), list(names))
+}
+
 /// What an effect of each block is, where only the differences between blocks are determined; with the block that differs most.
 pub(crate) fn differences_of_blocks(says: &str, odd: Option<&crate::diagnose::odd_block::OddBlock>) -> String {
     let says = format!("{}. Only the differences between blocks can be determined", says.trim_end_matches('.'));

@@ -97,7 +97,8 @@ pub(super) fn touches_of_run(
     env: &dyn Environment,
 ) -> Result<Vec<Touch>> {
     let mut touches = log.read(machine, plan, env)?.touches;
-    if log.controller != "csv" {
+    // a CSV may have its times on the study's clock already
+    if log.controller != "csv" || entry.started_s.is_some() {
         on_the_study_clock(&mut touches, plan, entry.started_s);
     }
     Ok(touches)

@@ -449,3 +449,29 @@ fn the_figures_of_the_model_are_the_same_in_every_answer() {
     let says = d["says"].as_str().unwrap();
     assert!(says.contains(&format!("with the {rejected} that are not used now")), "{says}");
 }
+
+/// The paper's plan ends before the spindle is warm: beside one time constant the growth would look sure to a tenth, and it is not. What
+/// is said of the size is what the model with it says.
+#[test]
+fn the_size_of_a_growth_is_no_surer_than_its_time_constant() {
+    let wrong =
+        "seed = 7\n[effects.spindle-growth]\nspindle_growth = 30.0\nspindle_tau = 0.8\n[noise]\ntouch_um = 1.0\n";
+    let folder = folder(&["head", "table"], wrong, None);
+    let at = folder.path();
+    let (d, _) = json(at, &["diagnose", "study.toml"]);
+    let first = &d["candidates"][0];
+    assert_eq!((first["effect"].as_str(), &first["proposed"]), (Some("spindle-growth"), &Value::Bool(true)), "{d}");
+    ok(at, &["add", "study.toml", "spindle-growth"]);
+    let (fit, _) = json(at, &["identify", "study.toml"]);
+    for said in first["parameters"].as_array().unwrap() {
+        let all = fit["parameters"].as_array().unwrap();
+        let fitted = all.iter().find(|p| p["name"] == said["name"]).unwrap();
+        for key in ["value", "sigma"] {
+            let [said, fitted] = [said, fitted].map(|p| p[key].as_f64().unwrap());
+            assert!((said / fitted - 1.0).abs() < 0.1, "{key}: {said}, fitted {fitted}");
+        }
+    }
+    let size = &first["parameters"][0];
+    let (value, sigma) = (size["value"].as_f64().unwrap(), size["sigma"].as_f64().unwrap());
+    assert!((value - 30.0).abs() < 3.0 * sigma, "{value} ± {sigma}");
+}

@@ -7,6 +7,7 @@ mod common;
 mod coverage;
 #[path = "../common/coverage.rs"]
 mod coverage_cases;
+mod csv_times;
 mod derivatives;
 mod doubt;
 mod formula_bounds;
