@@ -450,13 +450,13 @@ fn the_figures_of_the_model_are_the_same_in_every_answer() {
     assert!(says.contains(&format!("with the {rejected} that are not used now")), "{says}");
 }
 
-/// The paper's plan ends before the spindle is warm: beside one time constant the growth would look sure to a tenth, and it is not. What
+/// The plan ends before the spindle is warm: beside one time constant the growth would look sure to some hundredths, and it is not. What
 /// is said of the size is what the model with it says.
 #[test]
 fn the_size_of_a_growth_is_no_surer_than_its_time_constant() {
     let wrong =
-        "seed = 7\n[effects.spindle-growth]\nspindle_growth = 30.0\nspindle_tau = 0.8\n[noise]\ntouch_um = 1.0\n";
-    let folder = folder(&["head", "table"], wrong, None);
+        "seed = 7\n[effects.spindle-growth]\nspindle_growth = 30.0\nspindle_tau = 3.0\n[noise]\ntouch_um = 1.0\n";
+    let folder = folder(&["full"], wrong, None);
     let at = folder.path();
     let (d, _) = json(at, &["diagnose", "study.toml"]);
     let first = &d["candidates"][0];
@@ -473,5 +473,5 @@ fn the_size_of_a_growth_is_no_surer_than_its_time_constant() {
     }
     let size = &first["parameters"][0];
     let (value, sigma) = (size["value"].as_f64().unwrap(), size["sigma"].as_f64().unwrap());
-    assert!((value - 30.0).abs() < 3.0 * sigma, "{value} ± {sigma}");
+    assert!((value - 30.0).abs() < 3.0 * sigma && sigma > 0.2 * value, "{value} ± {sigma}");
 }
