@@ -475,3 +475,16 @@ fn the_size_of_a_growth_is_no_surer_than_its_time_constant() {
     let (value, sigma) = (size["value"].as_f64().unwrap(), size["sigma"].as_f64().unwrap());
     assert!((value - 30.0).abs() < 3.0 * sigma && sigma > 0.2 * value, "{value} ± {sigma}");
 }
+
+/// Without revisits the residuals alone say how far index positions scatter. Far more than the axes declare may be an effect: that is said.
+#[test]
+fn scatter_that_may_hide_an_effect_is_said() {
+    for (visit_um, hides) in [(0.5, false), (3.0, true)] {
+        let wrong = format!("seed = 3\n[noise]\ntouch_um = 1.0\nvisit_um = {visit_um:?}\n");
+        let folder = folder(&["head", "table"], &wrong, None);
+        let (d, _) = json(folder.path(), &["diagnose", "study.toml"]);
+        assert_eq!(d.get("declared_visit_um").is_some(), hides, "{visit_um}: {d}");
+        let said = String::from_utf8(axiscal(folder.path(), &["diagnose", "study.toml"]).stdout).unwrap();
+        assert_eq!(said.contains("an effect may be hidden in it"), hides, "{visit_um}: {said}");
+    }
+}
