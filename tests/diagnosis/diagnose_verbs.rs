@@ -485,6 +485,20 @@ fn scatter_that_may_hide_an_effect_is_said() {
         let (d, _) = json(folder.path(), &["diagnose", "study.toml"]);
         assert_eq!(d.get("declared_visit_um").is_some(), hides, "{visit_um}: {d}");
         let said = String::from_utf8(axiscal(folder.path(), &["diagnose", "study.toml"]).stdout).unwrap();
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
         assert_eq!(said.contains("an effect may be hidden in it"), hides, "{visit_um}: {said}");
+    }
+}
+
+/// So is a probe that repeats far worse than declared: dirt on the faces counts as its noise.
+#[test]
+fn repeats_that_may_hide_an_effect_are_said() {
+    for (touch_um, hides) in [(1.0, false), (3.0, true)] {
+        let folder = folder(&["full"], &format!("seed = 3\n[noise]\ntouch_um = {touch_um:?}\n"), None);
+        let (d, _) = json(folder.path(), &["diagnose", "study.toml"]);
+        assert_eq!(d.get("declared_noise_um").and_then(Value::as_f64).map(f64::round), hides.then_some(1.0), "{d}");
+        let said = String::from_utf8(axiscal(folder.path(), &["diagnose", "study.toml"]).stdout).unwrap();
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(said.contains("chips, dirt or a loose stylus count as noise here"), hides, "{touch_um}: {said}");
     }
 }

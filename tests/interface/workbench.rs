@@ -1,5 +1,6 @@
 //! The workbench from outside, over plain HTTP: how it is called, and what it must not break.
 
+use crate::common::verbs;
 use serde_json::{Value, json};
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
@@ -8,43 +9,14 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
-fn call(words: &[&str]) {
-    assert_cmd::Command::new(env!("CARGO_BIN_EXE_axiscal")).args(words).assert().success();
-}
-
-/// A program of the swivel head with its log, by the machine of `wrong.toml` in the folder.
-fn run(dir: &Path, program: &str) {
-    let at = |name: &str| dir.join(name).display().to_string();
-    let [plan, log] = ["plan.json", "log"].map(|end| at(&format!("{program}.{end}")));
-    call(&["generate", "--machine", "swivel-head", "--program", program, "--controller", "linuxcnc", "--out", &at("")]);
-    call(&[
-        "simulate",
-        "--plan",
-        &plan,
-        "--machine",
-        "swivel-head",
-        "--scenario",
-        &at("wrong.toml"),
-        "--controller",
-        "linuxcnc",
-        "--out",
-        &log,
-    ]);
-}
-
 /// A measured machine with an error that no model of it holds, made once.
 pub fn measured() -> &'static Path {
     static MADE: OnceLock<tempfile::TempDir> = OnceLock::new();
     MADE.get_or_init(|| {
-        let dir = tempfile::tempdir().unwrap();
-        let at = |name: &str| dir.path().join(name).display().to_string();
         let wrong = "seed = 3\n[effects.location-b]\nEX0B = 0.02\n[effects.squareness-xy]\nEC0Y = 400\n[noise]\ntouch_um = 0.5\n";
-        std::fs::write(at("wrong.toml"), wrong).unwrap();
-        run(dir.path(), "head");
-        call(&[
-            "new", "--machine", "swivel-head", "--plan", &at("head.plan.json"), "--log", &at("head.log"),
-            "--effects", "location-b,pretravel", "--known-blocks", "--out", &at("study.toml"),
-        ]);
+        let dir = verbs::touched(&["head"], wrong, None);
+        let new = ["new", "--plan", "head.plan.json", "--log", "head.log", "--effects", "location-b,pretravel"];
+        verbs::ok(dir.path(), &[&new[..], &["--known-blocks"], &verbs::COMMON, &["study.toml"]].concat());
         dir
     })
     .path()
@@ -415,19 +387,9 @@ fn an_effect_that_changes_on_the_disk_is_fitted_anew() {
 /// `plan-next` of the page asks about what each step of the page may have added wrongly, and not only about the last one.
 #[test]
 fn the_next_program_asks_about_every_step_of_the_page() {
-    let dir = tempfile::tempdir().unwrap();
-    let at = |name: &str| dir.path().join(name).display().to_string();
     let wrong =
         "seed = 5\n[effects.backlash-y]\nbacklash_Y = 6.0\n[effects.scale-z]\nEZZ = 80.0\n[noise]\ntouch_um = 1.0\n";
-    std::fs::write(at("wrong.toml"), wrong).unwrap();
-    let mut new = vec!["new".to_owned(), "--machine".to_owned(), "swivel-head".to_owned()];
-    for program in ["head", "table"] {
-        run(dir.path(), program);
-        new.extend(["--plan".to_owned(), at(&format!("{program}.plan.json"))]);
-        new.extend(["--log".to_owned(), at(&format!("{program}.log"))]);
-    }
-    new.extend(["--out".to_owned(), at("study.toml")]);
-    call(&new.iter().map(String::as_str).collect::<Vec<_>>());
+    let dir = verbs::folder(&["head", "table"], wrong, None);
     let w = Workbench::open(dir.path());
     for effect in ["backlash-y", "scale-z"] {
         assert_eq!(w.switch(effect, true).status, 200);

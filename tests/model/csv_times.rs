@@ -1,15 +1,7 @@
 //! Times of a CSV: on a clock of its own with `started`, else on the study's.
 
+use crate::common::verbs::{json, ok};
 use crate::common::{machine, plan};
-use assert_cmd::Command;
-use serde_json::Value;
-
-fn axiscal(folder: &std::path::Path, arguments: &[&str]) -> Value {
-    let mut command = Command::cargo_bin("axiscal").unwrap();
-    let output = command.current_dir(folder).args(arguments).output().unwrap();
-    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
-    serde_json::from_slice(&output.stdout).unwrap_or_default()
-}
 
 /// Two runs 8000 s apart; in each the machine drifts anew by 20 µm/h. On one clock that is hardly a steady drift, and with both runs in
 /// the same hours it is one.
@@ -26,7 +18,7 @@ fn started_places_a_csv_whose_times_begin_anew() {
         file("s.toml", &scenario);
         let out = format!("{run}.csv");
         let call = ["simulate", "--plan", "plan.json", "--machine", "swivel-head", "--scenario", "s.toml"];
-        axiscal(folder, &[&call[..], &["--controller", "csv", "--out", &out]].concat());
+        ok(folder, &[&call[..], &["--controller", "csv", "--out", &out]].concat());
     }
     // the same run on a clock that began with it
     let text = std::fs::read_to_string(folder.join("2.csv")).unwrap();
@@ -50,7 +42,7 @@ fn started_places_a_csv_whose_times_begin_anew() {
         let effects = "[\"location-b\", \"block-setup\", \"pretravel\", \"drift-linear\"]";
         let runs = data("1.csv", 0.0) + &data(second, 8000.0);
         file("study.toml", &format!("machine = \"swivel-head\"\n{runs}[model]\neffects = {effects}\n"));
-        let answer = axiscal(folder, &["identify", "study.toml", "--json"]);
+        let (answer, _) = json(folder, &["identify", "study.toml"]);
         let all = answer["parameters"].as_array().unwrap();
         drifts.push(all.iter().find(|p| p["name"] == "vz").unwrap()["value"].as_f64().unwrap());
     }
