@@ -28,7 +28,7 @@ pub(crate) fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
     }));
     out.extend(d.declared_visit_um.map(|declared_um| {
         format!(
-            "the residuals look like a scatter of the index positions by {} µm, and the machine's file declares {} µm: an effect may be hidden in it. Measure some poses twice and diagnose again",
+            "the tests allow for index positions that scatter by {} µm, and the machine's file declares {} µm: an effect may be hidden in it. Measure some poses twice and diagnose again",
             significant(d.visit_um),
             significant(declared_um)
         )
