@@ -248,7 +248,13 @@ pub(super) fn against(d: &Diagnosis) -> String {
 
 /// The verdict, the first sentence as the answer.
 pub(crate) fn verdict(d: &Diagnosis, fit: &Fit) -> String {
-    let says = answer(d, fit);
+    let mut says = answer(d, fit);
+    if let Some(declared_um) = d.declared_visit_um {
+        says += &format!(
+            " The tests allow for index positions that scatter by {:.2} µm, and the machine's file declares {declared_um:.2} µm: an effect may be hidden in it. Measure some poses twice and diagnose again.",
+            d.visit_um
+        );
+    }
     // beside a set-up mistake nothing else counts
     match d.oversized.first().filter(|_| d.mistake().is_none()) {
         None => says,

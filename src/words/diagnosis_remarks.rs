@@ -26,13 +26,6 @@ pub(crate) fn remarks(d: &Diagnosis, verbose: bool) -> Vec<String> {
             significant(declared_um)
         )
     }));
-    out.extend(d.declared_visit_um.map(|declared_um| {
-        format!(
-            "the tests allow for index positions that scatter by {} µm, and the machine's file declares {} µm: an effect may be hidden in it. Measure some poses twice and diagnose again",
-            significant(d.visit_um),
-            significant(declared_um)
-        )
-    }));
     for g in d.gross.iter().take(3) {
         let share = |share: f64| format!("{:.0} %", 100.0 * share);
         out.push(match (g.in_place, g.agrees) {
