@@ -44,7 +44,8 @@ pub(super) const LEAST_GAIN: f64 = 9.0;
 /// Where the search for the parameters of an effect begins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
-    /// Value of each unknown, by name, in its unit; sizes are 0 where the touches do not show the effect.
+    /// Value of each unknown, by name, in its unit; sizes are 0 where the touches do not show the effect. Where they show it, also
+    /// those of the fit beside which it was looked for.
     pub values: BTreeMap<String, f64>,
     /// By how much χ² falls.
     pub gain: f64,
@@ -208,7 +209,7 @@ impl<'a> ScoreTest<'a> {
         let (gain, size) = found;
         let n_parameters = (self.shaped.len() + size.len()) as f64;
         let shown = gain > LEAST_GAIN * n_parameters && self.is_credible(&size, NOT_CREDIBLE);
-        let mut values = BTreeMap::new();
+        let mut values = if shown { self.beside(&best, &size) } else { BTreeMap::new() };
         for (s, set) in self.sets.iter().enumerate() {
             let unknowns = &self.alone.0.unknowns[set.clone()];
             for (&i, v) in self.shaped.iter().zip(if shown { &best } else { &usual }) {
@@ -220,6 +221,15 @@ impl<'a> ScoreTest<'a> {
             }
         }
         Start { values, gain, shown }
+    }
+
+    /// Values of the sizes of the fit beside the effect, by name: they have taken over a part of what it does, and a search that begins
+    /// with both runs away.
+    fn beside(&self, shapes: &[f64], sizes: &DVector<f64>) -> BTreeMap<String, f64> {
+        let moved = &self.covariance * self.jacobian.tr_mul(&(self.columns(shapes) * sizes));
+        let unknowns = &self.fit.model.unknowns;
+        let free = self.fit.free.iter().zip(moved.iter()).filter(|(i, _)| !unknowns[**i].shape);
+        free.map(|(&i, moved)| (unknowns[i].name.clone(), self.fit.theta[i] - moved)).collect()
     }
 
     /// Tries values of one shape beside the others' best. Touches on a grid hardly see a wave that is as short as its steps: it follows
