@@ -1,7 +1,7 @@
 """Other methods on the cases of `cargo run --release --example discovery -- cases FOLDER`: the table of docs/discovery.md.
 
     python3 -m venv venv && venv/bin/pip install -r benches/discovery/requirements.txt
-    venv/bin/python benches/discovery/peers.py FOLDER
+    OPENBLAS_NUM_THREADS=1 venv/bin/python benches/discovery/peers.py FOLDER      # with more threads ARD takes many times as long
 
 Each case is a regression of whitened residuals on the columns of all candidate effects, both without what the model follows.
 All methods know the noise of a row (1) where they can use it. An effect is proposed where a method keeps one of its columns; the
