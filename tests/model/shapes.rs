@@ -4,9 +4,11 @@
 use crate::common;
 mod jumps;
 
+use axiscal::fit::nonlinear_scan::start_shapes;
 use axiscal::fit::outcome::Status;
 use axiscal::fit::{Contradiction, Found, Knowledge, Remark};
 use axiscal::fit::{Fit, Settings};
+use axiscal::model::catalogue::Catalogue;
 use axiscal::simulate::Scenario;
 use common::*;
 
@@ -45,6 +47,32 @@ fn sizes_are_no_surer_than_their_shapes() {
     assert!(2 * n >= 5 * runs, "{n} of {} values are told", 5 * runs);
     // nineteen of twenty, less twice the standard deviation of such a count
     assert!(inside * 10 >= n * 9, "{inside} of {n}");
+}
+
+/// A search for a time constant begins with everything else where it belongs beside the effect: the touches lie nearly as close as at
+/// its end. Beside the values of the fit without the effect they lay far off, and the search ran away.
+#[test]
+fn a_search_begins_near_its_end() {
+    let model = ["location-b", "location-c", "block-setup", "pretravel"];
+    let machine = machine("swivel-head");
+    let full = plan(&machine, "full");
+    let growth = [("spindle_growth", 30.0), ("spindle_tau", 3.0)];
+    let scenario = Scenario::flawless().with_noise(1e-3, 0.3e-3, 5);
+    let touches = touch(&machine, &full, &scenario.with(&machine, "spindle-growth", &growth).unwrap(), None);
+    let without = identify(&machine, &[(&full, &touches)], &model);
+    let with = identify(&machine, &[(&full, &touches)], &[&model[..], &["spindle-growth"]].concat());
+
+    let catalogue = Catalogue::built_in().unwrap();
+    let start = start_shapes(&without, &machine, catalogue.get("spindle-growth", &machine).unwrap());
+    assert!(start.shown);
+    let begins: Vec<f64> = with.model.unknowns.iter().map(|u| start.values[&u.name]).collect();
+    let rms_um = |theta: &[f64]| {
+        let gaps = with.data.observations.iter().map(|o| with.model.gap(o, theta));
+        1e3 * (gaps.map(|gap| gap * gap).sum::<f64>() / with.data.observations.len() as f64).sqrt()
+    };
+    let (first, last) = (rms_um(&begins), rms_um(&with.theta));
+    println!("{first} and {last} um, without the effect {} um", without.outcome.rms_um);
+    assert!(first < 1.1 * last && last < 0.6 * without.outcome.rms_um, "{first} and {last} um");
 }
 
 /// A prior on a time constant counts in its interval: the surer, the narrower.
