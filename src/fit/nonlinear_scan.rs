@@ -5,6 +5,7 @@
 //! taken with the size that it asks for.
 
 use super::candidates::{Trials, Variant};
+use super::local_minima::values;
 use super::whitening::Whitening;
 use super::{Fit, uncertainty};
 use crate::machine::Machine;
@@ -224,12 +225,13 @@ impl<'a> ScoreTest<'a> {
     }
 
     /// Values of the sizes of the fit beside the effect, by name: they have taken over a part of what it does, and a search that begins
-    /// with both runs away.
+    /// with both runs away. Sizes that begin at none again (see [`values`]) are left out.
     fn beside(&self, shapes: &[f64], sizes: &DVector<f64>) -> BTreeMap<String, f64> {
         let moved = &self.covariance * self.jacobian.tr_mul(&(self.columns(shapes) * sizes));
-        let unknowns = &self.fit.model.unknowns;
-        let free = self.fit.free.iter().zip(moved.iter()).filter(|(i, _)| !unknowns[**i].shape);
-        free.map(|(&i, moved)| (unknowns[i].name.clone(), self.fit.theta[i] - moved)).collect()
+        let (unknowns, theta, begins) = (&self.fit.model.unknowns, &self.fit.theta, values(self.fit));
+        let stays = |i: usize| begins.get(&unknowns[i].name) == Some(&theta[i]);
+        let free = self.fit.free.iter().zip(moved.iter()).filter(|(i, _)| !unknowns[**i].shape && stays(**i));
+        free.map(|(&i, moved)| (unknowns[i].name.clone(), theta[i] - moved)).collect()
     }
 
     /// Tries values of one shape beside the others' best. Touches on a grid hardly see a wave that is as short as its steps: it follows
