@@ -29,17 +29,23 @@ const browser = await chromium.launch({
     "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader"],
 });
 
+// what goes wrong beside a case (a page's request that a case answers, say) is a failure of that case, and does not end the others
+let beside = [];
+process.on("unhandledRejection", (error) => beside.push(error));
+
 let failed = 0;
 for (const [name, run] of cases) {
   const began = performance.now();
   const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, reducedMotion: "reduce" });
   const ends = [];
+  beside = [];
   try {
     await run({ context, dir, out, pictures, atEnd: (end) => ends.push(end) });
+    if (beside.length) throw beside.shift();
     console.log(`test ${name} ... ok (${((performance.now() - began) / 1e3).toFixed(1)} s)`);
   } catch (error) {
     failed += 1;
-    console.log(`test ${name} ... FAILED\n${error.stack ?? error}`);
+    console.log(`test ${name} ... FAILED\n${[error, ...beside].map((e) => e.stack ?? e).join("\n")}`);
     let k = 0;
     for (const page of context.pages()) {
       await page.screenshot({ path: join(out, `failed-${name}-${k++}.png`) }).catch(() => {});
