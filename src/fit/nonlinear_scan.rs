@@ -45,8 +45,8 @@ pub(super) const LEAST_GAIN: f64 = 9.0;
 /// Where the search for the parameters of an effect begins.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Start {
-    /// Value of each unknown, by name, in its unit; sizes are 0 where the touches do not show the effect. Where they show it, also
-    /// those of the fit beside which it was looked for.
+    /// Value of each unknown of the effect, by name, in its unit; sizes are 0 where the touches do not show it. Where they do, also the
+    /// values of the fit beside which it was looked for, its sizes moved to where they belong beside the effect.
     pub values: BTreeMap<String, f64>,
     /// By how much χ² falls.
     pub gain: f64,
@@ -224,14 +224,27 @@ impl<'a> ScoreTest<'a> {
         Start { values, gain, shown }
     }
 
-    /// Values of the sizes of the fit beside the effect, by name: they have taken over a part of what it does, and a search that begins
-    /// with both runs away. Sizes that begin at none again (see [`values`]) are left out.
+    /// Values of the unknowns of the fit beside the effect, by name: its sizes have taken over a part of what the effect does, and a search
+    /// that begins with both may run away. Its shapes stay; sizes that begin at none again (see [`values`]) are left out.
     fn beside(&self, shapes: &[f64], sizes: &DVector<f64>) -> BTreeMap<String, f64> {
-        let moved = &self.covariance * self.jacobian.tr_mul(&(self.columns(shapes) * sizes));
-        let (unknowns, theta, begins) = (&self.fit.model.unknowns, &self.fit.theta, values(self.fit));
-        let stays = |i: usize| begins.get(&unknowns[i].name) == Some(&theta[i]);
-        let free = self.fit.free.iter().zip(moved.iter()).filter(|(i, _)| !unknowns[**i].shape && stays(**i));
-        free.map(|(&i, moved)| (unknowns[i].name.clone(), theta[i] - moved)).collect()
+        let (unknowns, theta, free, begins) =
+            (&self.fit.model.unknowns, &self.fit.theta, &self.fit.free, values(self.fit));
+        let stays = |i: usize| unknowns[i].shape || begins.get(&unknowns[i].name) != Some(&theta[i]);
+        let mut covariance = self.covariance.clone();
+        let mut moved = &covariance * self.jacobian.tr_mul(&(self.columns(shapes) * sizes));
+        // the rest moves as it does beside known values of those that stay
+        for k in (0..free.len()).filter(|&k| stays(free[k])) {
+            let own = covariance[(k, k)];
+            if own > LEAST_OWN * self.covariance[(k, k)] {
+                let gain = covariance.column(k) / own;
+                moved -= &gain * moved[k];
+                covariance -= &gain * covariance.row(k).into_owned();
+            }
+        }
+        let of_shapes =
+            (0..unknowns.len()).filter(|&i| unknowns[i].shape).map(|i| (unknowns[i].name.clone(), theta[i]));
+        let of_sizes = free.iter().zip(moved.iter()).filter(|(i, _)| !stays(**i));
+        of_shapes.chain(of_sizes.map(|(&i, moved)| (unknowns[i].name.clone(), theta[i] - moved))).collect()
     }
 
     /// Tries values of one shape beside the others' best. Touches on a grid hardly see a wave that is as short as its steps: it follows
