@@ -33,6 +33,8 @@ const browser = await chromium.launch({
 let beside = [];
 process.on("unhandledRejection", (error) => beside.push(error));
 
+// until all cases have ended
+process.exitCode = 1;
 let failed = 0;
 for (const [name, run] of cases) {
   const began = performance.now();

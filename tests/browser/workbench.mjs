@@ -1,6 +1,6 @@
 // The workbench: the whole loop on a machine with a hidden effect, and everything that a page may do to a study.
 
-import { appendFileSync, existsSync, readFileSync, readdirSync, writeFileSync } from "node:fs";
+import { appendFileSync, existsSync, readFileSync, readdirSync, renameSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
 import { RISE_H, accessible, axiscal, equal, holds, many, measured, warming, watched, workbench } from "./tools.mjs";
 
@@ -27,8 +27,17 @@ export async function after(page, work) {
   const now = await version(page);
   await page.waitForFunction((v) => {
     const plot = document.querySelector("#residuals .plot");
-    return document.querySelector("#plots").hidden || Number(plot.dataset.version) === v;
+    return document.querySelector("#plots").hidden || Number(plot.dataset.version) >= v;
   }, now);
+}
+
+/** Waits until a page shows the state that another one shows, or a newer one. */
+const catchesUp = async (page, other) => page.waitForFunction((v) => Number(document.body.dataset.version) >= v, await version(other));
+
+/** Writes a file as an editor does: whoever looks meanwhile sees the old one whole. */
+function replaced(file, text) {
+  writeFileSync(`${file}.new`, text);
+  renameSync(`${file}.new`, file);
 }
 
 /** Largest mark of the plot in µm, and its place on the screen: what a person sees falling. */
@@ -151,9 +160,10 @@ async function noClickIsLost(t) {
     const { x, y, width, height } = await button.boundingBox();
     await page.mouse.move(x + width / 2, y + height / 2);
     const answered = page.waitForResponse("**/api/evidence");
+    for (const until = Date.now() + 20_000; !held && Date.now() < until;) await page.waitForTimeout(10);
+    holds(held > 0, "no evidence was asked for");
     const began = performance.now();
     await page.mouse.down();
-    holds(held > 0, "no evidence was asked for");
     goOn();
     await (await answered).finished();
     await page.waitForTimeout(50);
@@ -295,9 +305,9 @@ async function formulaWithATimeConstant(t) {
   await shape.locator("[data-word=start]").fill("0.3");
   await shape.locator("[data-word=min]").fill("0.01");
   await shape.locator("[data-word=max]").fill("10");
-  await page.waitForFunction(() => document.querySelector("#draft-answer").textContent.startsWith("with it"));
-  equal(await page.isHidden("#previewed"), false, "the curve");
-  equal(await page.textContent("#draft-shapes .mistake"), "");
+  // each of the fields that were filled may have its own answer: what stands there at the end counts
+  await page.waitForFunction(() => document.querySelector("#draft-answer").textContent.startsWith("with it")
+    && document.querySelector("#draft-shapes .mistake").textContent === "" && !document.querySelector("#previewed").hidden);
   // a mistake of the program's stands at its field as well
   await shape.locator("[data-word=min]").fill("5");
   await page.waitForFunction(() => document.querySelector("#draft-shapes .mistake").textContent.length > 0);
@@ -369,11 +379,11 @@ async function changeOnDisk(t) {
   const { folder, page } = await opened(t, "disk");
   const file = join(folder, "study.toml");
   const before = text(folder);
-  await after(page, async () => writeFileSync(file, before.replace('"pretravel"', '"pretravel", "squareness-xy"')));
+  await after(page, async () => replaced(file, before.replace('"pretravel"', '"pretravel", "squareness-xy"')));
   equal(await page.locator("#in-model [data-switch=squareness-xy]").count(), 1, "the effect from the disk");
-  writeFileSync(file, "machine = \n");
+  replaced(file, "machine = \n");
   await page.waitForFunction(() => document.querySelector("#messages-text").textContent.includes("study.toml:1:"));
-  writeFileSync(file, before);
+  replaced(file, before);
   await page.waitForFunction(() => document.querySelector("#messages-text").textContent === "");
   equal(await page.locator("#in-model [data-switch=squareness-xy]").count(), 0);
 }
@@ -385,15 +395,19 @@ async function twoTabs(t) {
   await other.waitForSelector("body[data-version]");
   // what one tab does shows in the other
   await after(other, () => page.click("#candidates >> nth=0 >> [role=switch] >> nth=0"));
+  await catchesUp(page, other);
   equal(await other.textContent("#rms"), await page.textContent("#rms"));
   // a step that was asked of an older state is refused, and the page shows the new one
   const held = [];
   await other.route("**/api/step", (route) => { held.push(route); });
+  const asked = other.waitForRequest("**/api/step");
   await other.click("#undo");
-  await page.waitForTimeout(100);
+  await asked;
   await after(page, () => page.click("#undo"));
   for (const route of held) await route.continue();
   await other.waitForFunction(() => document.querySelector("#messages-text").textContent.includes("changed meanwhile"));
+  await catchesUp(other, page);
+  await catchesUp(page, other);
   equal(await version(other), await version(page));
   holds(!text(folder).includes("squareness-xy"), "the study has two minds");
 }
@@ -446,6 +460,7 @@ async function withoutLocks(t) {
   await other.waitForSelector("body[data-version]");
   for (const { asked } of [seen, its]) equal(asked.filter((url) => url.endsWith("/api/events")).length, 1, "streams");
   await after(other, () => page.click("#candidates >> nth=0 >> [role=switch] >> nth=0"));
+  await catchesUp(page, other);
   equal(await other.textContent("#rms"), await page.textContent("#rms"));
 }
 
