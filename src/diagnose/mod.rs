@@ -351,13 +351,18 @@ impl<'a> Tested<'a> {
         let may_refit = options.refit && fit.outcome.rms_um <= setup_mistakes::GROSS_UM;
         let has_outliers = fit.rejected.values().any(Reason::is_outlier);
         let leading = seen.groups.first().map(|group| seen.named.effects[group.first()].id.as_str());
-        // worked out at the same time as the answer: what the refit still misses, or a refit that shows which outliers come back
+        // worked out at the same time as the answer: what the refit still misses and its sizes, or a refit that shows which outliers
+        // come back
         let of_refit = || match &refitted {
-            Some(again) => (Some(still_fails(again, machine, catalogue)), None),
-            None if may_refit && has_outliers => (None, leading.map(|id| (id, tried_with(subject, &[id])))),
-            None => (None, None),
+            Some(again) => {
+                let remains = || Some(still_fails(again, machine, catalogue));
+                let (remains, whole) = rayon::join(remains, || beside_its_shapes(subject, again, &seen.first_names()));
+                (remains, whole, None)
+            }
+            None if may_refit && has_outliers => (None, None, leading.map(|id| (id, tried_with(subject, &[id])))),
+            None => (None, None, None),
         };
-        let (mut out, (remains, tried)) = rayon::join(
+        let (mut out, (remains, whole, tried)) = rayon::join(
             || assemble_diagnosis::put_together(subject, &seen, features, (decision, &beside), gross, options),
             of_refit,
         );
@@ -379,12 +384,8 @@ impl<'a> Tested<'a> {
                 let mut proposed: Vec<&mut answer::Candidate> =
                     out.candidates.iter_mut().filter(|c| c.proposed).collect();
                 proposed.iter_mut().for_each(|c| c.rms_after_um = again.outcome.rms_um);
-                if proposed.iter().any(|c| c.is_beside_a_shape()) {
-                    let names: Vec<&str> = proposed.iter().map(|c| &*c.effect).collect();
-                    let settings = Settings { quick: false, bare: true, ..settings_with(subject, &names) };
-                    if let Ok(whole) = identify_beside(&again, machine, catalogue, &settings) {
-                        proposed.iter_mut().for_each(|c| assemble_diagnosis::sizes_of_refit(c, &whole));
-                    }
+                if let Some(whole) = whole {
+                    proposed.iter_mut().for_each(|c| assemble_diagnosis::sizes_of_refit(c, &whole));
                 }
             }
             assemble_diagnosis::outliers_again(&mut out, fit, &again);
@@ -485,6 +486,16 @@ pub fn with_effects(subject: Subject, more: &[&str]) -> Result<Fit> {
 /// When an effect is unknown.
 fn tried_with(subject: Subject, more: &[&str]) -> Result<Fit> {
     identify_beside(subject.fit, subject.machine, subject.catalogue, &settings_with(subject, more))
+}
+
+/// The whole fit with more effects, where a trial fit with them has found shapes of theirs: it says how sure their sizes are beside
+/// unknown shapes.
+fn beside_its_shapes(subject: Subject, again: &Fit, more: &[&str]) -> Option<Fit> {
+    if !again.model.unknowns.iter().any(|u| u.shape && more.contains(&u.effect.as_str())) {
+        return None;
+    }
+    let settings = Settings { quick: false, bare: true, ..settings_with(subject, more) };
+    identify_beside(again, subject.machine, subject.catalogue, &settings).ok()
 }
 
 fn settings_with(subject: Subject, more: &[&str]) -> Settings {
