@@ -29,8 +29,9 @@ const browser = await chromium.launch({
     "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader"],
 });
 
-// what goes wrong beside a case (a page's request that a case answers, say) is a failure of that case, and does not end the others
-let beside = [];
+// what goes wrong beside a case (a page's request that a case answers, say) is a failure of that case or, while it is put away, of the
+// next one, and does not end the others
+const beside = [];
 process.on("unhandledRejection", (error) => beside.push(error));
 
 // until all cases have ended
@@ -40,7 +41,6 @@ for (const [name, run] of cases) {
   const began = performance.now();
   const context = await browser.newContext({ viewport: { width: 1280, height: 800 }, reducedMotion: "reduce" });
   const ends = [];
-  beside = [];
   try {
     await run({ context, dir, out, pictures, atEnd: (end) => ends.push(end) });
     if (beside.length) throw beside.shift();
@@ -48,6 +48,7 @@ for (const [name, run] of cases) {
   } catch (error) {
     failed += 1;
     console.log(`test ${name} ... FAILED\n${[error, ...beside].map((e) => e.stack ?? e).join("\n")}`);
+    beside.length = 0;
     let k = 0;
     for (const page of context.pages()) {
       await page.screenshot({ path: join(out, `failed-${name}-${k++}.png`) }).catch(() => {});
@@ -57,6 +58,10 @@ for (const [name, run] of cases) {
   await context.close();
 }
 await browser.close();
+for (const error of beside) {
+  failed += 1;
+  console.log(`after the last case: ${error.stack ?? error}`);
+}
 rmSync(dir, { recursive: true, force: true });
 console.log(`\ntest result: ${failed ? "FAILED" : "ok"}. ${cases.length - failed} passed; ${failed} failed; 0 ignored; 0 measured; 0 filtered out\n`);
 process.exitCode = failed ? 1 : 0;
