@@ -152,10 +152,12 @@ fn scan_of(effect: &Effect, data: &Data) -> Option<(usize, Vec<f64>)> {
     shapes.enumerate().find_map(|(i, p)| Some((i, scan(p, data).filter(|s| s.len() > 1)?)))
 }
 
-/// An effect at one value of its scanned shape.
+/// An effect at the values of its scanned shape.
 struct Tried {
-    /// The value; 0 where nothing is scanned.
-    value: f64,
+    /// Which of its shapes is scanned, by its place among them.
+    which: Option<usize>,
+    /// The values, in the order of their columns; 0 where nothing is scanned.
+    values: Vec<f64>,
     /// What its sizes would do, as rows of the tests; nothing where it is made anew whenever it is needed.
     white: Arc<Vec<f64>>,
 }
@@ -168,75 +170,117 @@ struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    /// Effect number i with its shapes where they start, one of them (by its place among the shapes) at another value.
-    fn make(&self, i: usize, shape: Option<(usize, f64)>) -> Tried {
+    /// Effect number i with its shapes where they start, one of them (by its place among the shapes) at other values; with
+    /// room for some more.
+    fn make(&self, i: usize, which: Option<usize>, values: &[f64], room: usize) -> Arc<Vec<f64>> {
         let n_rows = self.evidence.n_rows();
-        let white = match Library::keeps(n_rows) {
-            true => Library::part(n_rows, self.evidence.whiten(self.source.columns(Chosen { effect: i, shape }, None))),
-            false => Arc::default(),
-        };
-        Tried { value: shape.map_or(0.0, |(_, value)| value), white }
+        if !Library::keeps(n_rows) {
+            return Arc::default();
+        }
+        let size = self.source.sizes(i).count() * n_rows;
+        let mut data = vec![0.0; size * (values.len() + room)];
+        data.par_chunks_mut(size.max(1)).zip(values).for_each(|(own, value)| {
+            let chosen = Chosen { effect: i, shape: which.map(|which| (which, *value)) };
+            own.copy_from_slice(self.evidence.whiten(self.source.columns(chosen, None)).as_slice());
+        });
+        Library::part(n_rows, data)
+    }
+
+    /// The columns of effect number i at values of one of its shapes that are made when they are needed.
+    fn columns(&self, i: usize, which: Option<usize>, values: &[f64]) -> Vec<(Chosen, usize)> {
+        let n = self.source.sizes(i).count();
+        let chosen = |value: &f64| Chosen { effect: i, shape: which.map(|which| (which, *value)) };
+        values.iter().map(chosen).flat_map(|chosen| (0..n).map(move |k| (chosen, k))).collect()
     }
 
     /// Which of the values of effect number i explains most, and how much: nothing where the touches see none.
-    fn best_of(&self, (i, which): (usize, usize), tried: &[Tried]) -> (usize, f64) {
+    fn best_of(&self, (i, which): (usize, usize), values: &[f64], white: &Arc<Vec<f64>>) -> (usize, f64) {
         let n = self.source.sizes(i).count();
         let n_rows = self.evidence.n_rows();
         let mut library = if Library::keeps(n_rows) {
-            Library::of_parts(n_rows, tried.iter().map(|t| &t.white))
+            let mut library = Library::new(n_rows);
+            library.put(white);
+            library
         } else {
-            let chosen = |t: &Tried| {
-                let chosen = Chosen { effect: i, shape: Some((which, t.value)) };
-                (0..n).map(move |k| (chosen, k))
-            };
-            let all: Vec<(Chosen, usize)> = tried.iter().flat_map(chosen).collect();
+            let all = self.columns(i, Some(which), values);
             Library::made(n_rows, all.len(), self.source.make(all))
         };
-        let variant = |(k, t): (usize, &Tried)| search::Variant { shape: t.value, columns: k * n..(k + 1) * n };
-        library.place("tried", Origin::Catalogue, tried.iter().enumerate().map(variant).collect(), 1);
+        let variant = |(k, value): (usize, &f64)| search::Variant { shape: *value, columns: k * n..(k + 1) * n };
+        library.place("tried", Origin::Catalogue, values.iter().enumerate().map(variant).collect(), 1);
         search::best_variant(self.evidence.question(), &library).unwrap_or((0, 0.0))
+    }
+
+    /// A library of all columns, and the first of each effect.
+    fn library(&self, tried: &[Tried]) -> (Library, Vec<usize>) {
+        let n_rows = self.evidence.n_rows();
+        let each = || tried.iter().enumerate();
+        if !Library::keeps(n_rows) {
+            let all: Vec<_> = each().map(|(i, t)| self.columns(i, t.which, &t.values)).collect();
+            let ends = all.iter().scan(0, |end, own| {
+                *end += own.len();
+                Some(*end - own.len())
+            });
+            let first = ends.collect();
+            let all = all.concat();
+            return (Library::made(n_rows, all.len(), self.source.make(all)), first);
+        }
+        // the columns of a scan where they are, the few of the other effects in one piece
+        let of_few: Vec<&[f64]> = tried.iter().filter(|t| t.which.is_none()).map(|t| &t.white[..]).collect();
+        let mut library = Library::new(n_rows);
+        let mut few = library.put(&Arc::new(of_few.concat())).start;
+        let place = |(i, t): (usize, &Tried)| match t.which {
+            Some(_) => library.put(&t.white).start,
+            None => {
+                few += self.source.sizes(i).count();
+                few - self.source.sizes(i).count()
+            }
+        };
+        let first = each().map(place).collect();
+        (library, first)
     }
 
     /// An effect at all values of its scan, and at a better one beside the best of them: a jump that was tried between index
     /// visits only may come in mid-visit, and where an effect is large a number between two that were tried leaves so much
     /// that another effect seems better.
-    fn scan(&self, i: usize, effect: &Effect, (which, values): (usize, Vec<f64>)) -> Vec<Tried> {
-        let make_all = |values: &[f64]| -> Vec<Tried> {
-            values.par_iter().map(|value| self.make(i, Some((which, *value)))).collect()
-        };
-        let mut kept = make_all(&values);
-        let coarse = self.best_of((i, which), &kept);
+    fn scan(&self, i: usize, effect: &Effect, (which, mut values): (usize, Vec<f64>)) -> Tried {
+        let mut white = self.make(i, Some(which), &values, 1);
+        let coarse = self.best_of((i, which), &values, &white);
         let shape = effect.parameters.iter().filter(|p| p.shape.is_some()).nth(which);
-        let Some(shape) = shape else { return kept };
-        let mut best = (values[coarse.0], coarse.1, None);
-        let try_also = |more: &[f64], best: (f64, f64, Option<Tried>)| {
-            let mut made = make_all(more);
-            match self.best_of((i, which), &made) {
-                (at, gain) if gain > best.1 => (more[at], gain, Some(made.swap_remove(at))),
+        let mut best = (values[coarse.0], coarse.1, Vec::new());
+        let size = white.len() / (values.len() + 1);
+        let try_also = |more: &[f64], best: (f64, f64, Vec<f64>)| {
+            let made = self.make(i, Some(which), more, 0);
+            match self.best_of((i, which), more, &made) {
+                (at, gain) if gain > best.1 => (more[at], gain, made[at * size..(at + 1) * size].to_vec()),
                 _ => best,
             }
         };
-        // the misfit that a pitch leaves goes up and down with it: its best place may be between any two values
-        let finer = if shape.between.is_none() { between(&values) } else { Vec::new() };
-        best = try_also(&finer, best);
-        let mut tried = [&values[..], &finer].concat();
-        tried.sort_by(f64::total_cmp);
-        loop {
-            let more = around(shape, &self.fit.data, &tried, best.0);
-            let before = best.1;
-            best = try_also(&more, best);
-            // of a number that changes smoothly there are always more steps between
-            if more.is_empty() || (shape.between.is_none() && best.1 < WORTH_A_CLOSER_LOOK * before) {
-                break;
-            }
-            tried.extend(more);
+        if let Some(shape) = shape {
+            // the misfit that a pitch leaves goes up and down with it: its best place may be between any two values
+            let finer = if shape.between.is_none() { between(&values) } else { Vec::new() };
+            best = try_also(&finer, best);
+            let mut tried = [&values[..], &finer].concat();
             tried.sort_by(f64::total_cmp);
+            loop {
+                let more = around(shape, &self.fit.data, &tried, best.0);
+                let before = best.1;
+                best = try_also(&more, best);
+                // of a number that changes smoothly there are always more steps between
+                if more.is_empty() || (shape.between.is_none() && best.1 < WORTH_A_CLOSER_LOOK * before) {
+                    break;
+                }
+                tried.extend(more);
+                tried.sort_by(f64::total_cmp);
+            }
         }
-        if let (_, _, Some(better)) = best {
-            kept.push(better);
-            kept.sort_by(|a, b| a.value.total_cmp(&b.value));
+        // in place: no library has the columns now
+        let data = Arc::make_mut(&mut white);
+        data.truncate(size * values.len());
+        if best.0 != values[coarse.0] {
+            values.push(best.0);
+            data.extend(best.2);
         }
-        kept
+        Tried { which: Some(which), values, white }
     }
 }
 
@@ -287,37 +331,27 @@ impl<'c> Named<'c> {
         drop(places);
         let source = Arc::new(Source { model, traces, starts, rows: evidence.rows.clone() });
         let maker = Maker { fit, evidence, source: &source };
-        let kept = Library::keeps(evidence.n_rows());
-        let all_of = |(i, effect): (usize, &&Effect)| {
-            let scan = scan_of(effect, &fit.data);
-            let which = scan.as_ref().map(|(which, _)| *which);
-            (which, scan.map_or_else(|| vec![maker.make(i, None)], |scan| maker.scan(i, effect, scan)))
+        let all_of = |(i, effect): (usize, &&Effect)| match scan_of(effect, &fit.data) {
+            Some(scan) => maker.scan(i, effect, scan),
+            None => Tried { which: None, values: vec![0.0], white: maker.make(i, None, &[0.0], 0) },
         };
-        let tried: Vec<(Option<usize>, Vec<Tried>)> = effects.par_iter().enumerate().map(all_of).collect();
-        let chosen = |i: usize, which: Option<usize>, t: &Tried| {
-            let chosen = Chosen { effect: i, shape: which.map(|which| (which, t.value)) };
-            (0..source.sizes(i).count()).map(move |k| (chosen, k))
-        };
-        let each = || tried.iter().enumerate().flat_map(|(i, (which, all))| all.iter().map(move |t| (i, *which, t)));
-        let mut library = if kept {
-            Library::joined(evidence.n_rows(), tried.iter().flat_map(|(_, all)| all).map(|t| &*t.white))
-        } else {
-            let all: Vec<(Chosen, usize)> = each().flat_map(|(i, which, t)| chosen(i, which, t)).collect();
-            Library::made(evidence.n_rows(), all.len(), source.make(all))
-        };
-        let (mut columns, mut scanned, mut at) = (Vec::new(), Vec::new(), 0);
-        for ((i, effect), (which, tried)) in effects.iter().enumerate().zip(tried) {
+        let tried: Vec<Tried> = effects.par_iter().enumerate().map(all_of).collect();
+        let (mut library, first) = maker.library(&tried);
+        let (mut columns, mut scanned) = (Vec::new(), Vec::new());
+        for ((i, effect), Tried { which, values, .. }) in effects.iter().enumerate().zip(tried) {
             let column = |u: &Unknown| {
                 let positive = effect.parameters.iter().any(|p| p.name == u.own_name() && p.positive);
                 Column { name: u.name.clone(), unit: u.unit.clone(), typical: typical(u), positive }
             };
             let own: Vec<Column> = source.sizes(i).map(column).collect();
             let origin = if effect.built_in { Origin::Catalogue } else { Origin::User };
-            let variant = |t: &Tried| {
-                at += own.len();
-                search::Variant { shape: t.value, columns: at - own.len()..at }
+            let variant = |(k, value): (usize, f64)| {
+                let at = first[i] + k * own.len();
+                search::Variant { shape: value, columns: at..at + own.len() }
             };
-            library.place(&effect.id, origin, tried.iter().map(variant).collect(), usize::from(which.is_some()));
+            let mut variants: Vec<_> = values.into_iter().enumerate().map(variant).collect();
+            variants.sort_by(|a, b| a.shape.total_cmp(&b.shape));
+            library.place(&effect.id, origin, variants, usize::from(which.is_some()));
             library.positive_of_last((0..own.len()).filter(|&k| own[k].positive).collect());
             columns.push(own);
             let shape = which.and_then(|which| effect.parameters.iter().filter(|p| p.shape.is_some()).nth(which));

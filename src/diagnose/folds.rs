@@ -81,15 +81,16 @@ impl Folds {
 
     /// Of some candidates of the tests, in ascending order.
     fn held_out(&self, evidence: &Evidence, named: &Named, candidates: &[usize], choice: Choice) -> HeldOut {
-        let mut library = named.library.some(|c| candidates.contains(&c));
-        if let Some(own) = &self.otherwise {
-            let all = candidates
-                .iter()
-                .flat_map(|&c| (0..named.library.candidates()[c].variants.len()).map(move |variant| (c, variant)));
-            let raw = named.raw_um(&all.collect::<Vec<_>>());
-            let white: Vec<DMatrix<f64>> = raw.into_iter().map(|um| own.whiten(um.map(mm_from_um))).collect();
-            library = library.with_variants(own.n_rows(), white);
-        }
+        let wanted = |c| candidates.contains(&c);
+        let library = match &self.otherwise {
+            Some(own) => {
+                let variants = |&c: &usize| (0..named.library.candidates()[c].variants.len()).map(move |v| (c, v));
+                let raw = named.raw_um(&candidates.iter().flat_map(variants).collect::<Vec<_>>());
+                let white: Vec<DMatrix<f64>> = raw.into_iter().map(|um| own.whiten(um.map(mm_from_um))).collect();
+                named.library.most(wanted).with_variants(own.n_rows(), &white)
+            }
+            None => named.library.some(wanted),
+        };
         let own = self.otherwise.as_ref().unwrap_or(evidence);
         held_out_in(own.question(), &library, &own.visits, choice, &self.colours)
     }

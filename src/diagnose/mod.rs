@@ -44,7 +44,7 @@ use crate::fit::held_out::by_visit;
 use crate::fit::{Fit, Reason, Settings, VisitSource, declared_tau_mm, identify_beside, identify_data};
 use crate::machine::Machine;
 use crate::model::catalogue::Catalogue;
-use crate::search::dependence::{Dependence, dependences};
+use crate::search::dependence::{Dependence, dependences, depends_on_anything};
 use crate::search::groups::{Group, Member};
 use crate::search::held_out::{Choice, HeldOut, held_out};
 use crate::search::pattern_tests::{Features, Generics};
@@ -517,11 +517,7 @@ fn still_fails(fit: &Fit, machine: &Machine, catalogue: &Catalogue) -> bool {
     if found.search().leader().is_some() {
         return true;
     }
-    let patterns = Search::new(question, &found.generics.library);
-    dependences(&patterns, &features, &found.generics)
-        .iter()
-        .any(|d| d.p_adjusted < crate::search::multiplicity::FAMILY_LEVEL)
-        || lack_of_fit(&question).p < decide::LACK_OF_FIT
+    depends_on_anything(question, &found.generics) || lack_of_fit(&question).p < decide::LACK_OF_FIT
 }
 
 /// Is the scatter of index positions named first?

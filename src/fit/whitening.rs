@@ -5,12 +5,11 @@ use nalgebra::{DMatrix, DMatrixViewMut, Dyn, Matrix3, OMatrix, U3, Vector3};
 /// What turns columns of gaps (one row per touch, mm or mm per unit) into rows of unit noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Whitening {
-    /// Square root of each touch's weight: zero where it is not used.
-    pub(super) root: Vec<f64>,
+    /// Square root of each touch's weight in standard deviations of a touch, 1/mm: zero where it is not used. Empty where rows are
+    /// of unit noise already.
+    pub(super) scale: Vec<f64>,
     /// Index visits whose touches share a displacement, one after the other.
     pub(super) visits: Vec<Visit>,
-    /// Standard deviation of a touch.
-    pub(super) sigma_mm: f64,
 }
 
 /// Outward normals in R, each times the root of its weight: one row for each touch.
@@ -30,20 +29,21 @@ pub(super) struct Visit {
 }
 
 impl Visit {
-    /// Takes out what the touches of the visit share. A visit has few touches, and there are many columns: plain sums are several
-    /// times as fast here as products of matrices of any size.
+    /// Takes out what the touches of the visit share. A visit has few touches, and there are many columns: plain sums by place are
+    /// several times as fast here as products of matrices of any size.
     fn apply(&self, part: &mut [f64]) {
-        let (x, others) = self.normals.as_slice().split_at(part.len());
-        let (y, z) = others.split_at(part.len());
+        let n = part.len();
+        let (x, others) = self.normals.as_slice().split_at(n);
+        let (y, z) = others.split_at(n);
         let mut shared = Vector3::zeros();
-        for (((value, x), y), z) in part.iter().zip(x).zip(y).zip(z) {
-            shared.x += x * value;
-            shared.y += y * value;
-            shared.z += z * value;
+        for i in 0..n {
+            shared.x += x[i] * part[i];
+            shared.y += y[i] * part[i];
+            shared.z += z[i] * part[i];
         }
         let by = self.root * shared;
-        for (((value, x), y), z) in part.iter_mut().zip(x).zip(y).zip(z) {
-            *value -= x * by.x + y * by.y + z * by.z;
+        for i in 0..n {
+            part[i] -= x[i] * by.x + y[i] * by.y + z[i] * by.z;
         }
     }
 }
@@ -70,25 +70,19 @@ impl Whitening {
             (place, from) = (end, to);
         }
         all.extend(&touches[place..]);
-        let root = all.iter().filter_map(|&touch| self.root.get(touch).copied()).collect();
-        (all, Self { root, visits, sigma_mm: self.sigma_mm })
+        let scale = all.iter().filter_map(|&touch| self.scale.get(touch).copied()).collect();
+        (all, Self { scale, visits })
     }
 
     /// The same for a part of a matrix.
     pub fn apply_to(&self, mut columns: DMatrixViewMut<'_, f64>) {
-        let weighted = self.root.iter().any(|root| *root != 1.0);
         for mut column in columns.column_iter_mut() {
-            if weighted {
-                column.iter_mut().zip(&self.root).for_each(|(x, root)| *x *= root);
-            }
+            column.as_mut_slice().iter_mut().zip(&self.scale).for_each(|(x, scale)| *x *= scale);
             let mut rest = column.as_mut_slice();
             for visit in &self.visits {
                 let (own, behind) = rest.split_at_mut(visit.normals.nrows());
                 visit.apply(own);
                 rest = behind;
-            }
-            if self.sigma_mm != 1.0 {
-                column.unscale_mut(self.sigma_mm);
             }
         }
     }
@@ -160,7 +154,7 @@ impl VisitNormals {
             }
             Visit { normals: visit.normals.clone(), root }
         };
-        Whitening { root: Vec::new(), visits: self.visits.iter().map(of).collect(), sigma_mm: 1.0 }
+        Whitening { scale: Vec::new(), visits: self.visits.iter().map(of).collect() }
     }
 
     /// Logarithm of the determinant of the touches' covariance, in units of a touch's variance.

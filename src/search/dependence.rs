@@ -1,8 +1,9 @@
 //! On what the misfit depends: variables ranked, with the curve itself and a formula to start from.
 
-use super::KEPT;
+use super::basis::Basis;
 use super::groups::Member;
 use super::library::{Library, Origin};
+use super::moments::KEPT;
 use super::multiplicity::{FAMILY_LEVEL, GENERIC_LEVEL};
 use super::pattern_tests::{CONSTANT, Features, Generics, Shape};
 use super::score::{Question, Score, Search};
@@ -98,17 +99,9 @@ pub struct Dependence {
 pub fn dependences(patterns: &Search, features: &Features, generics: &Generics) -> Vec<Dependence> {
     let question = patterns.question;
     let total = question.base.project(question.residual).norm_squared();
-    let constants: Vec<usize> =
-        (0..generics.shapes.len()).filter(|&c| generics.shapes[c].depends_on == CONSTANT).collect();
-    let mut base = question.base.clone();
-    let mut library = Library::new(generics.library.n_rows());
-    for &c in &constants {
-        let columns = generics.library.columns(c, 0);
-        base.extend(&columns, KEPT);
-        library.push(&generics.library.candidates()[c].id, Origin::Generic, &columns);
-    }
-    let same = Search::new(question, &library);
-    let search = patterns.with_larger_base(Question { base: &base, ..question });
+    let constants = Constants::new(&question, generics);
+    let same = Search::new(question, &constants.library);
+    let search = patterns.with_larger_base(Question { base: &constants.base, ..question });
     let mut ranking = search.ranking();
     // what passes goes before what does not: of one variable the first entry speaks
     ranking.sort_by_key(|&c| !search.scores[c].proposed());
@@ -141,10 +134,8 @@ pub fn dependences(patterns: &Search, features: &Features, generics: &Generics) 
     };
     let mut out: Vec<Dependence> = first.par_iter().map(of).collect();
     if let Some(mut score) = same.ranking().first().map(|&c| same.scores[c].clone()) {
-        // one family with all the shapes
-        let tested = search.scores.iter().filter(|s| s.visible()).count() + library.candidates().len();
-        score.p_adjusted = (score.p * tested as f64 * FAMILY_LEVEL / GENERIC_LEVEL).min(1.0);
-        score.candidate = constants[score.candidate];
+        score.p_adjusted = constants.p_adjusted(&score, &search);
+        score.candidate = constants.candidates[score.candidate];
         let passes = |d: &Dependence| d.p_adjusted < FAMILY_LEVEL;
         let constant = dependence(&search, &score, &generics.shapes[score.candidate], features, generics, total);
         // beside something that changes it is the level of that
@@ -152,6 +143,46 @@ pub fn dependences(patterns: &Search, features: &Features, generics: &Generics) 
         out.insert(at, constant);
     }
     out
+}
+
+/// Does the misfit depend on anything, the constant included? As [`dependences`] finds it, at a part of the cost.
+#[must_use]
+pub fn depends_on_anything(question: Question, generics: &Generics) -> bool {
+    let constants = Constants::new(&question, generics);
+    let same = Search::new(question, &constants.library);
+    let search = Search::new(Question { base: &constants.base, ..question }, &generics.library);
+    let first = same.ranking().first().map(|&c| constants.p_adjusted(&same.scores[c], &search));
+    first.is_some_and(|p| p < FAMILY_LEVEL) || search.scores.iter().any(Score::proposed)
+}
+
+/// Shapes that are the same at every touch.
+struct Constants {
+    /// Their indices among all shapes.
+    candidates: Vec<usize>,
+    library: Library,
+    /// The model's base with them.
+    base: Basis,
+}
+
+impl Constants {
+    fn new(question: &Question, generics: &Generics) -> Self {
+        let is_constant = |c: &usize| generics.shapes[*c].depends_on == CONSTANT;
+        let candidates: Vec<usize> = (0..generics.shapes.len()).filter(is_constant).collect();
+        let mut base = question.base.clone();
+        let mut library = Library::new(generics.library.n_rows());
+        for &c in &candidates {
+            let columns = generics.library.columns(c, 0);
+            base.extend(&columns, KEPT);
+            library.push(&generics.library.candidates()[c].id, Origin::Generic, &columns);
+        }
+        Self { candidates, library, base }
+    }
+
+    /// A constant's adjusted p-value: it is in one family with all the shapes that are tested beside it.
+    fn p_adjusted(&self, score: &Score, others: &Search) -> f64 {
+        let tested = others.scores.iter().filter(|s| s.visible()).count() + self.candidates.len();
+        (score.p * tested as f64 * FAMILY_LEVEL / GENERIC_LEVEL).min(1.0)
+    }
 }
 
 fn dependence(

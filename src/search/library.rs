@@ -126,41 +126,22 @@ impl Library {
         n_rows <= MOST_ROWS_KEPT
     }
 
-    /// A library of columns in memory that belong to no candidate yet ([`Library::place`]).
+    /// Columns that may be in libraries ([`Library::put`]), one after the other: those of rounding are nothing.
     #[must_use]
-    pub fn kept(n_rows: usize, mut data: Vec<f64>) -> Self {
-        const COLUMNS_AT_ONCE: usize = 64;
-        data.par_chunks_mut((COLUMNS_AT_ONCE * n_rows).max(1)).for_each(|some| clear_rounding(some, n_rows));
-        let count = data.len().checked_div(n_rows).unwrap_or(0);
-        let part = Part { span: 0..count, columns: Columns::Kept(Arc::new(data)) };
-        Self { n_rows, parts: vec![part], candidates: Vec::new() }
+    pub fn part(n_rows: usize, mut columns: Vec<f64>) -> Arc<Vec<f64>> {
+        clear_rounding(&mut columns, n_rows);
+        Arc::new(columns)
     }
 
-    /// Columns that are to be in a library ([`Library::of_parts`], [`Library::joined`]): those of rounding are nothing.
-    #[must_use]
-    pub fn part(n_rows: usize, columns: DMatrix<f64>) -> Arc<Vec<f64>> {
-        let mut data: Vec<f64> = columns.data.into();
-        clear_rounding(&mut data, n_rows);
-        Arc::new(data)
-    }
-
-    /// A library of such columns where they are, without a copy; work on many small parts takes longer than on one.
-    #[must_use]
-    pub fn of_parts<'a>(n_rows: usize, parts: impl Iterator<Item = &'a Arc<Vec<f64>>>) -> Self {
-        let mut out = Self::new(n_rows);
-        for data in parts.filter(|data| !data.is_empty()) {
-            let first = out.n_columns();
-            let span = first..first + data.len().checked_div(n_rows).unwrap_or(0);
-            out.parts.push(Part { span, columns: Columns::Kept(data.clone()) });
+    /// Puts such columns at the end where they are, without a copy: candidates are [`Library::place`]d on them. Work on many
+    /// small parts takes longer than on one.
+    pub fn put(&mut self, data: &Arc<Vec<f64>>) -> Range<usize> {
+        let first = self.n_columns();
+        let span = first..first + data.len().checked_div(self.n_rows).unwrap_or(0);
+        if !span.is_empty() {
+            self.parts.push(Part { span: span.clone(), columns: Columns::Kept(data.clone()) });
         }
-        out
-    }
-
-    /// A library of columns of many parts in one piece.
-    #[must_use]
-    pub fn joined<'a>(n_rows: usize, parts: impl Iterator<Item = &'a Vec<f64>>) -> Self {
-        let parts: Vec<&[f64]> = parts.map(Vec::as_slice).collect();
-        Self::of_parts(n_rows, std::iter::once(&Arc::new(parts.concat())))
+        span
     }
 
     /// A library of columns that are made when they are needed: many touches have more of them than memory holds.
@@ -345,9 +326,12 @@ impl Library {
 
     /// The same candidates with columns that were whitened otherwise, variant by variant.
     #[must_use]
-    pub fn with_variants(&self, n_rows: usize, columns: Vec<DMatrix<f64>>) -> Self {
-        let parts: Vec<_> = columns.into_iter().map(|columns| Self::part(n_rows, columns)).collect();
-        Self { candidates: self.candidates.clone(), ..Self::joined(n_rows, parts.iter().map(|part| &**part)) }
+    pub fn with_variants(&self, n_rows: usize, columns: &[DMatrix<f64>]) -> Self {
+        let (mut out, mut candidates) = (Self::new(n_rows), self.candidates.clone());
+        for (variant, columns) in candidates.iter_mut().flat_map(|c| &mut c.variants).zip(columns) {
+            variant.columns = out.keep(columns);
+        }
+        Self { candidates, ..out }
     }
 
     /// The same candidates in a regression whose rows a change makes of this one's; `None` where columns are not kept in memory.

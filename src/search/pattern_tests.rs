@@ -8,7 +8,6 @@ use super::library::{Library, Origin, Variant};
 use super::moments::Change;
 use super::shapes::{Function, Grouping};
 use nalgebra::{DMatrix, Vector3};
-use rayon::prelude::*;
 use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::Arc;
@@ -222,9 +221,6 @@ pub trait Rows: Send + Sync {
     fn some(&self, rows: &[usize], um: &dyn Fn(&[usize]) -> DMatrix<f64>) -> DMatrix<f64>;
 }
 
-/// Columns that one thread makes at a time.
-const COLUMNS_AT_ONCE: usize = 64;
-
 /// All generic shapes of a table, as rows of a regression.
 #[must_use]
 pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
@@ -247,25 +243,17 @@ pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
         made.extend(own.iter().map(|f| (bare[place].clone(), f.clone())));
     }
     let n_columns = made.len();
-    let (n_rows, n) = (rows.count(), features.directions.first().map_or(0, |d| d.weight.len()));
+    let rows_count = rows.count();
     let names: Vec<String> = features.directions.iter().map(|d| d.name.clone()).collect();
     let features = features.clone();
     let make = move |numbers: &[usize], at: Option<&[usize]>| -> DMatrix<f64> {
         let made = || numbers.iter().map(|&number| &made[number]);
         match at {
-            None => rows.all(gaps(&features, made(), 0..n)),
-            Some(at) => rows.some(at, &|touches| gaps(&features, made(), touches.iter().copied())),
+            None => rows.all(gaps(&features, made(), None)),
+            Some(at) => rows.some(at, &|touches| gaps(&features, made(), Some(touches))),
         }
     };
-    let mut library = if !Library::keeps(n_rows) {
-        Library::made(n_rows, n_columns, Arc::new(make))
-    } else {
-        let numbers: Vec<usize> = (0..n_columns).collect();
-        let mut data = vec![0.0; n_rows * n_columns];
-        let pieces = data.par_chunks_mut((COLUMNS_AT_ONCE * n_rows).max(1)).zip(numbers.par_chunks(COLUMNS_AT_ONCE));
-        pieces.for_each(|(piece, some)| piece.copy_from_slice(make(some, None).as_slice()));
-        Library::kept(n_rows, data)
-    };
+    let mut library = Library::made(rows_count, n_columns, Arc::new(make));
     let mut shapes = Vec::new();
     for ((id, shape, values, n_scanned), spans) in planned.into_iter().zip(spans) {
         let variants = spans.into_iter().zip(values).map(|(columns, shape)| Variant { shape, columns }).collect();
@@ -279,29 +267,41 @@ pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
     Generics { library, shapes }
 }
 
-/// What some touches see of one unit of each of some functions, µm.
+/// What some touches (`None`: all) see of one unit of each of some functions, µm.
 fn gaps<'a>(
     features: &Features,
     wanted: impl ExactSizeIterator<Item = &'a (Arc<Shape>, Function)>,
-    touches: impl ExactSizeIterator<Item = usize> + Clone,
+    touches: Option<&[usize]>,
 ) -> DMatrix<f64> {
+    let all: Vec<usize>;
+    let touches = match touches {
+        Some(some) => some,
+        None => {
+            all = (0..features.directions.first().map_or(0, |d| d.weight.len())).collect();
+            &all
+        }
+    };
+    let weights = |d: &Direction| -> Vec<f64> { touches.iter().map(|&touch| d.weight[touch]).collect() };
+    let weights: Vec<Vec<f64>> = features.directions.iter().map(weights).collect();
     let mut out = DMatrix::zeros(touches.len(), wanted.len());
-    let mut known: Vec<(&Function, Vec<f64>)> = Vec::new();
+    // values of a function where its variables act
+    let mut known: Vec<(&Function, &[usize], Vec<f64>)> = Vec::new();
     for (mut column, (shape, function)) in out.column_iter_mut().zip(wanted) {
-        let at = known.iter().rposition(|(f, _)| *f == function).unwrap_or_else(|| {
-            known.push((function, touches.clone().map(|touch| function.at_row(features, touch)).collect()));
+        let is_it = |(f, of, _): &(&Function, &[usize], Vec<f64>)| *f == function && *of == shape.variables;
+        let at = known.iter().rposition(is_it).unwrap_or_else(|| {
+            let partly = || shape.variables.iter().map(|&v| &features.variables[v]).filter(|v| !v.acts.is_empty());
+            let acts = |touch: usize| partly().all(|v| v.acts_at(touch));
+            let at = |&touch: &usize| if acts(touch) { function.at_row(features, touch) } else { 0.0 };
+            known.push((function, &shape.variables, touches.iter().map(at).collect()));
             known.len() - 1
         });
-        let weight = shape.direction.map(|d| &features.directions[d].weight);
-        let partly: Vec<&Variable> =
-            shape.variables.iter().map(|&v| &features.variables[v]).filter(|v| !v.acts.is_empty()).collect();
-        let values = column.iter_mut().zip(&known[at].1).zip(touches.clone());
-        if partly.is_empty() {
-            values.for_each(|((gap, value), touch)| *gap = weight.map_or(1.0, |w| w[touch]) * value);
-            continue;
-        }
-        for ((gap, value), touch) in values.filter(|(_, touch)| partly.iter().all(|v| v.acts_at(*touch))) {
-            *gap = weight.map_or(1.0, |w| w[touch]) * value;
+        let (gap, values) = (column.as_mut_slice(), &known[at].2);
+        match shape.direction {
+            Some(d) => {
+                let each = gap.iter_mut().zip(values).zip(&weights[d]);
+                each.for_each(|((gap, value), weight)| *gap = weight * value);
+            }
+            None => gap.copy_from_slice(values),
         }
     }
     out

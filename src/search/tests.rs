@@ -388,12 +388,11 @@ fn the_best_variant_is_that_of_the_whole_test() {
 fn a_library_in_parts_is_the_one_in_a_piece_and_each_may_be_changed_alone() {
     let mut rng = rng(25);
     let columns: Vec<DMatrix<f64>> = (1..4).map(|q| noise_matrix(&mut rng, 30, q)).collect();
-    let parts: Vec<_> = columns.iter().map(|c| Library::part(30, c.clone())).collect();
-    let in_parts = Library::of_parts(30, parts.iter());
-    let joined = Library::joined(30, parts.iter().map(|part| &**part));
-    assert_eq!((in_parts.n_columns(), in_parts.matrix()), (6, joined.matrix()));
+    let (mut in_parts, all) = (Library::new(30), side_by_side(&columns));
+    let spans = columns.iter().map(|c| in_parts.put(&Library::part(30, c.as_slice().to_vec()))).collect::<Vec<_>>();
+    assert_eq!((spans, in_parts.matrix()), (vec![0..1, 1..3, 3..6], all.clone()));
     let doubled = in_parts.clone().changed(&|mut columns| columns *= 2.0).unwrap();
-    assert_eq!((doubled.matrix(), in_parts.matrix()), (joined.matrix() * 2.0, joined.matrix()));
+    assert_eq!((doubled.matrix(), in_parts.matrix()), (&all * 2.0, all));
 }
 
 #[test]
