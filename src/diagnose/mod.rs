@@ -284,9 +284,14 @@ impl<'a> Tested<'a> {
         let Subject { machine, fit, .. } = subject;
         let Regression { evidence, named, generics, .. } = found;
         let mut seen = examine(fit, found, search, features, options.at_most);
-        let weighed = match seen.groups.first().filter(|_| seen.nested.is_some()) {
-            Some(group) => effects_versus_patterns::weigh(&seen, generics, group.first()),
-            None => effects_versus_patterns::Weighed::default(),
+        let may_refit = options.refit && fit.outcome.rms_um <= setup_mistakes::GROSS_UM;
+        let (weighed, first_tried) = match seen.groups.first().filter(|_| seen.nested.is_some()) {
+            Some(group) => rayon::join(
+                || effects_versus_patterns::weigh(&seen, generics, group.first()),
+                // it will most likely be asked for, and takes as long
+                || may_refit.then(|| tried_with(subject, &seen.first_names())),
+            ),
+            None => (effects_versus_patterns::Weighed::default(), None),
         };
         let mut beside = decide::OtherEvidence {
             shapes_win: weighed.shapes_win,
@@ -296,7 +301,6 @@ impl<'a> Tested<'a> {
             scatter: scatter(fit, machine, evidence),
         };
         let mut decision = decide::decide(&seen, &beside);
-        let may_refit = options.refit && fit.outcome.rms_um <= setup_mistakes::GROSS_UM;
         let mut refitted = None;
         if let Some(pair) = pairs::both(subject, &seen, &decision) {
             let (groups, scores) = pairs::in_front(&seen, &pair, options.at_most);
@@ -313,7 +317,7 @@ impl<'a> Tested<'a> {
             }
         }
         if seen.both.is_none() && may_refit && decision.confirmed {
-            let again = tried_with(subject, &seen.first_names())?;
+            let again = first_tried.unwrap_or_else(|| tried_with(subject, &seen.first_names()))?;
             if raises_the_error(fit, &again) {
                 (decision.kind, decision.confirmed) = (decide::Kind::Unexplained, false);
             }
@@ -355,8 +359,9 @@ impl<'a> Tested<'a> {
         // come back
         let of_refit = || match &refitted {
             Some(again) => {
-                let remains = || Some(still_fails(again, machine, catalogue));
-                let (remains, whole) = rayon::join(remains, || beside_its_shapes(subject, again, &seen.first_names()));
+                // the fit first: it is one long piece, and the tests are many short ones
+                let whole = || beside_its_shapes(subject, again, &seen.first_names());
+                let (whole, remains) = rayon::join(whole, || Some(still_fails(again, machine, catalogue)));
                 (remains, whole, None)
             }
             None if may_refit && has_outliers => (None, None, leading.map(|id| (id, tried_with(subject, &[id])))),

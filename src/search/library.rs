@@ -189,7 +189,9 @@ impl Library {
     fn keep(&mut self, columns: &DMatrix<f64>) -> Range<usize> {
         let first = self.n_columns();
         let span = first..first + columns.ncols();
-        if !matches!(self.parts.last(), Some(Part { columns: Columns::Kept(_), .. })) {
+        // columns that another library has too stay as they are
+        let own = |part: &Part| matches!(&part.columns, Columns::Kept(data) if Arc::strong_count(data) == 1);
+        if !self.parts.last().is_some_and(own) {
             self.parts.push(Part { span: first..first, columns: Columns::Kept(Arc::default()) });
         }
         if let Some(Part { span: all, columns: Columns::Kept(data) }) = self.parts.last_mut() {
@@ -372,8 +374,21 @@ impl Library {
         // in the order of the columns: neighbours may be made together
         let mut variants: Vec<&mut Variant> = candidates.iter_mut().flat_map(|c| &mut c.variants).collect();
         variants.sort_by_key(|variant| variant.columns.start);
-        for variant in variants {
-            variant.columns = out.take(self, &variant.columns);
+        for part in &self.parts {
+            let ends = variants.partition_point(|variant| variant.columns.start < part.span.end);
+            let own = variants.drain(..ends).collect::<Vec<_>>();
+            let is_whole = own.iter().map(|variant| variant.columns.len()).sum::<usize>() == part.span.len();
+            match &part.columns {
+                // without a copy
+                Columns::Kept(data) if is_whole => {
+                    let at = out.put(data).start;
+                    let moved = |columns: &Range<usize>| {
+                        columns.start - part.span.start + at..columns.end - part.span.start + at
+                    };
+                    own.into_iter().for_each(|variant| variant.columns = moved(&variant.columns));
+                }
+                _ => own.into_iter().for_each(|variant| variant.columns = out.take(self, &variant.columns)),
+            }
         }
         Self { candidates, ..out }
     }

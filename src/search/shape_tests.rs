@@ -1,7 +1,8 @@
 //! Generic shapes on a small plan: which variable is named, how often clean data are suspected, and how long it takes.
 
-use super::dependence::{Dependence, dependences};
-use super::pattern_tests::{Direction, Features, Generics, Kind, Rows, Variable, generics};
+use super::dependence::{Dependence, dependences, depends_on_anything};
+use super::multiplicity::FAMILY_LEVEL;
+use super::pattern_tests::{CONSTANT, Direction, Features, Generics, Kind, Rows, Variable, generics};
 use super::testing::{noise, rng};
 use super::tests::{ask, correlated_library};
 use super::*;
@@ -148,6 +149,35 @@ fn shapes_of_no_catalogue_are_named_by_their_variable() {
     assert_eq!((shape.name.as_str(), shape.unit.as_str()), ("period", "h"));
     assert!(shape.min < 0.15 && 0.15 < shape.max, "{shape:?}");
     assert_eq!(first.terms[1].formula.as_deref(), Some("sin(2*pi*t/period)"));
+}
+
+#[test]
+fn the_short_question_has_the_answer_of_the_long_one() {
+    let mut rng = rng(22);
+    let f = table_of_touches(&mut rng);
+    let n = f.block.len();
+    // a base that leaves the constants of all other directions
+    let base = Basis::new(&DMatrix::from_column_slice(n, 1, &f.directions[0].weight));
+    let g = generics_of(&f);
+    let alone = (0..f.directions.len()).map(|d| f.directions[d].weight.clone());
+    let of_c = |d: usize| (0..n).map(|i| f.directions[d].weight[i] * (3.0 * f.variables[2].values[i]).sin()).collect();
+    let planted: Vec<Vec<f64>> = alone.chain((0..3).map(of_c)).collect();
+    let (mut yes, mut constant, mut no) = (0, 0, 0);
+    for shape in planted.into_iter().map(DVector::from_vec) {
+        let left = base.project(&shape).norm();
+        // from nothing to what nobody overlooks, with most in between
+        for size in [0.0, 3.0, 4.0, 5.0, 6.0, 7.0, 9.0] {
+            let r = noise(&mut rng, n) - &shape * if left > 1e-6 { size / left } else { 0.0 };
+            let all = found(&f, &g, &base, &r);
+            let expected = all.iter().any(|d| d.p_adjusted < FAMILY_LEVEL);
+            assert_eq!(depends_on_anything(ask(&r, &base), &g), expected, "{:?}", all.first());
+            let only_constant = |d: &Dependence| (d.p_adjusted < FAMILY_LEVEL) == (d.on == CONSTANT);
+            constant += usize::from(expected && all.iter().all(only_constant));
+            *(if expected { &mut yes } else { &mut no }) += 1;
+        }
+    }
+    // all three are asked
+    assert!(yes > 10 && no > 10 && constant > 0 && yes > constant, "{yes} {no} {constant}");
 }
 
 #[test]
