@@ -172,7 +172,7 @@ struct Maker<'a> {
 impl Maker<'_> {
     /// Effect number i with its shapes where they start, one of them (by its place among the shapes) at other values; with
     /// room for some more.
-    fn make(&self, i: usize, which: Option<usize>, values: &[f64], room: usize) -> Arc<Vec<f64>> {
+    fn whitened(&self, i: usize, which: Option<usize>, values: &[f64], room: usize) -> Arc<Vec<f64>> {
         let n_rows = self.evidence.n_rows();
         if !Library::keeps(n_rows) {
             return Arc::default();
@@ -186,8 +186,8 @@ impl Maker<'_> {
         Library::part(n_rows, data)
     }
 
-    /// The columns of effect number i at values of one of its shapes that are made when they are needed.
-    fn columns(&self, i: usize, which: Option<usize>, values: &[f64]) -> Vec<(Chosen, usize)> {
+    /// Which columns effect number i has at values of one of its shapes.
+    fn listed(&self, i: usize, which: Option<usize>, values: &[f64]) -> Vec<(Chosen, usize)> {
         let n = self.source.sizes(i).count();
         let chosen = |value: &f64| Chosen { effect: i, shape: which.map(|which| (which, *value)) };
         values.iter().map(chosen).flat_map(|chosen| (0..n).map(move |k| (chosen, k))).collect()
@@ -202,7 +202,7 @@ impl Maker<'_> {
             library.put(white);
             library
         } else {
-            let all = self.columns(i, Some(which), values);
+            let all = self.listed(i, Some(which), values);
             Library::made(n_rows, all.len(), self.source.make(all))
         };
         let variant = |(k, value): (usize, &f64)| search::Variant { shape: *value, columns: k * n..(k + 1) * n };
@@ -215,12 +215,12 @@ impl Maker<'_> {
         let n_rows = self.evidence.n_rows();
         let each = || tried.iter().enumerate();
         if !Library::keeps(n_rows) {
-            let all: Vec<_> = each().map(|(i, t)| self.columns(i, t.which, &t.values)).collect();
-            let ends = all.iter().scan(0, |end, own| {
+            let all: Vec<_> = each().map(|(i, t)| self.listed(i, t.which, &t.values)).collect();
+            let starts = all.iter().scan(0, |end, own| {
                 *end += own.len();
                 Some(*end - own.len())
             });
-            let first = ends.collect();
+            let first = starts.collect();
             let all = all.concat();
             return (Library::made(n_rows, all.len(), self.source.make(all)), first);
         }
@@ -243,13 +243,13 @@ impl Maker<'_> {
     /// visits only may come in mid-visit, and where an effect is large a number between two that were tried leaves so much
     /// that another effect seems better.
     fn scan(&self, i: usize, effect: &Effect, (which, mut values): (usize, Vec<f64>)) -> Tried {
-        let mut white = self.make(i, Some(which), &values, 1);
+        let mut white = self.whitened(i, Some(which), &values, 1);
         let coarse = self.best_of((i, which), &values, &white);
         let shape = effect.parameters.iter().filter(|p| p.shape.is_some()).nth(which);
         let mut best = (values[coarse.0], coarse.1, Vec::new());
         let size = white.len() / (values.len() + 1);
         let try_also = |more: &[f64], best: (f64, f64, Vec<f64>)| {
-            let made = self.make(i, Some(which), more, 0);
+            let made = self.whitened(i, Some(which), more, 0);
             match self.best_of((i, which), more, &made) {
                 (at, gain) if gain > best.1 => (more[at], gain, made[at * size..(at + 1) * size].to_vec()),
                 _ => best,
@@ -333,7 +333,7 @@ impl<'c> Named<'c> {
         let maker = Maker { fit, evidence, source: &source };
         let all_of = |(i, effect): (usize, &&Effect)| match scan_of(effect, &fit.data) {
             Some(scan) => maker.scan(i, effect, scan),
-            None => Tried { which: None, values: vec![0.0], white: maker.make(i, None, &[0.0], 0) },
+            None => Tried { which: None, values: vec![0.0], white: maker.whitened(i, None, &[0.0], 0) },
         };
         let tried: Vec<Tried> = effects.par_iter().enumerate().map(all_of).collect();
         let (mut library, first) = maker.library(&tried);

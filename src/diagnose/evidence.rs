@@ -87,11 +87,6 @@ impl Rows for WhiteRows {
         columns_um.apply(|um| *um = mm_from_um(*um));
         self.of_mm(columns_um)
     }
-
-    fn some(&self, rows: &[usize], um: &dyn Fn(&[usize]) -> DMatrix<f64>) -> DMatrix<f64> {
-        let (touches, part) = self.part(rows);
-        part.all(um(&touches))
-    }
 }
 
 impl Evidence {

@@ -288,8 +288,11 @@ impl<'a> Tested<'a> {
         let (weighed, first_tried) = match seen.groups.first().filter(|_| seen.nested.is_some()) {
             Some(group) => rayon::join(
                 || effects_versus_patterns::weigh(&seen, generics, group.first()),
-                // it will most likely be asked for, and takes as long
-                || may_refit.then(|| tried_with(subject, &seen.first_names())),
+                // where held-out touches bear the choice out it will most likely be asked for
+                || {
+                    let borne_out = may_refit && seen.nested.as_ref().is_some_and(decide::bears_out);
+                    borne_out.then(|| tried_with(subject, &seen.first_names()))
+                },
             ),
             None => (effects_versus_patterns::Weighed::default(), None),
         };

@@ -55,7 +55,7 @@ impl<'c> Regression<'c> {
         let evidence = Evidence::with_visits(fit, scatter.tests);
         Self {
             named: named.changed(change).unwrap_or_else(|| Named::for_fit(fit, &evidence, machine, catalogue)),
-            generics: generics.changed(change).unwrap_or_else(|| features::shapes(&evidence, features)),
+            generics: features::shapes(&evidence, features),
             order_mm: Some(scatter.order).filter(|order_mm| *order_mm < scatter.tests),
             ordered: OnceLock::new(),
             evidence,

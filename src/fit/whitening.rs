@@ -5,8 +5,8 @@ use nalgebra::{DMatrix, DMatrixViewMut, Dyn, Matrix3, OMatrix, U3, Vector3};
 /// What turns columns of gaps (one row per touch, mm or mm per unit) into rows of unit noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Whitening {
-    /// Square root of each touch's weight in standard deviations of a touch, 1/mm: zero where it is not used. Empty where rows are
-    /// of unit noise already.
+    /// Square root of each touch's weight divided by the standard deviation of a touch, 1/mm: zero where it is not used. Empty
+    /// where rows are of unit noise already.
     pub(super) scale: Vec<f64>,
     /// Index visits whose touches share a displacement, one after the other.
     pub(super) visits: Vec<Visit>,

@@ -1,13 +1,12 @@
 //! On what the misfit depends: variables ranked, with the curve itself and a formula to start from.
 
-use super::basis::Basis;
 use super::groups::Member;
 use super::library::{Library, Origin};
-use super::moments::KEPT;
 use super::multiplicity::{FAMILY_LEVEL, GENERIC_LEVEL};
 use super::pattern_tests::{CONSTANT, Features, Generics, Shape};
 use super::score::{Question, Score, Search};
 use super::shapes::{Function, Grouping};
+use super::{Basis, KEPT};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::ops::Range;

@@ -71,7 +71,7 @@ pub struct Candidate {
 /// Makes whitened columns, by their numbers, at some rows (`None`: at all).
 pub type Make = Arc<dyn Fn(&[usize], Option<&[usize]>) -> DMatrix<f64> + Send + Sync>;
 
-/// Rows up to which columns are kept in memory.
+/// Rows up to which columns of effects are kept in memory.
 const MOST_ROWS_KEPT: usize = 4_000;
 
 /// Columns that are worked on at once.
@@ -120,7 +120,7 @@ impl Library {
         Self { n_rows, ..Self::default() }
     }
 
-    /// Are columns of so many rows kept in memory? Thousands of candidates have a column each.
+    /// Are columns of so many rows kept in memory? Effects have thousands, with all values of their scans.
     #[must_use]
     pub fn keeps(n_rows: usize) -> bool {
         n_rows <= MOST_ROWS_KEPT
@@ -144,7 +144,8 @@ impl Library {
         span
     }
 
-    /// A library of columns that are made when they are needed: many touches have more of them than memory holds.
+    /// A library of columns that are made when they are needed: there are more of them than memory holds, or than it gives back
+    /// faster.
     #[must_use]
     pub fn made(n_rows: usize, count: usize, make: Make) -> Self {
         let columns = Columns::Made { make, numbers: (0..count).collect(), nothing: vec![OnceLock::new(); count] };
@@ -340,14 +341,16 @@ impl Library {
     #[must_use]
     pub fn changed(mut self, change: super::Change) -> Option<Self> {
         let n_rows = self.n_rows;
-        for part in &mut self.parts {
+        let of_part = |part: &mut Part| {
             let Columns::Kept(data) = &mut part.columns else { return None };
             // in place, unless another library has them too
             Arc::make_mut(data).par_chunks_mut((CHUNK * n_rows).max(1)).for_each(|some| {
                 let columns = some.len() / n_rows;
                 change(DMatrixViewMut::from_slice(some, n_rows, columns));
             });
-        }
+            Some(())
+        };
+        self.parts.par_iter_mut().map(of_part).collect::<Option<()>>()?;
         Some(self)
     }
 
@@ -436,4 +439,41 @@ fn made(make: &Make, numbers: &[usize], nothing: &[OnceLock<bool>], rows: Option
         }
     }
     columns
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn some_candidates_share_whole_parts_which_stay_as_they_are() {
+        let columns = DMatrix::from_fn(5, 6, |i, k| (10 * k + i) as f64);
+        let part = |from: usize, n: usize| Library::part(5, columns.columns(from, n).iter().copied().collect());
+        let mut all = Library::new(5);
+        let spans = [part(0, 1), part(1, 2), part(3, 3)].map(|part| all.put(&part));
+        assert_eq!((spans, all.matrix()), ([0..1, 1..3, 3..6], columns.clone()));
+        let variant = |columns: Range<usize>| Variant { shape: 0.0, columns };
+        all.place("left out", Origin::Catalogue, vec![variant(0..1)], 0);
+        all.place("piece", Origin::Catalogue, vec![variant(2..3)], 0);
+        all.place("whole", Origin::Catalogue, vec![variant(5..6), variant(3..5)], 0);
+        let mut some = all.some(|c| c != 0);
+        let is_shared = |of: &Library| {
+            let parts = of.parts.iter().filter_map(|part| match &part.columns {
+                Columns::Kept(data) => Some(data),
+                Columns::Made { .. } => None,
+            });
+            let Columns::Kept(whole) = &all.parts[2].columns else { return 0 };
+            parts.filter(|data| Arc::ptr_eq(data, whole)).count()
+        };
+        assert_eq!(is_shared(&some), 1);
+        some.push("more", Origin::Catalogue, &(columns.columns(0, 1) * 3.0));
+        assert_eq!((is_shared(&some), some.n_columns()), (1, 5));
+        for (candidate, variant, first, n) in [(0, 0, 2, 1), (1, 0, 5, 1), (1, 1, 3, 2)] {
+            assert_eq!(some.columns(candidate, variant), columns.columns(first, n), "{candidate} {variant}");
+        }
+        assert_eq!(some.columns(2, 0), columns.columns(0, 1) * 3.0);
+        // and each may be changed alone
+        let doubled = all.clone().changed(&|mut columns| columns *= 2.0).unwrap();
+        assert_eq!((doubled.matrix(), all.matrix()), (&columns * 2.0, columns));
+    }
 }

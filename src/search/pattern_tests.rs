@@ -5,7 +5,6 @@
 //! all as candidates of the same tests, a scan as the variants of one candidate.
 
 use super::library::{Library, Origin, Variant};
-use super::moments::Change;
 use super::shapes::{Function, Grouping};
 use nalgebra::{DMatrix, Vector3};
 use std::collections::HashMap;
@@ -201,12 +200,6 @@ impl Generics {
     pub fn without(&self, depends_on: &str) -> Library {
         self.library.most(|c| self.shapes[c].depends_on != depends_on)
     }
-
-    /// The same in a regression whose rows a change makes of this one's; `None` where columns are not kept in memory.
-    #[must_use]
-    pub fn changed(self, change: Change) -> Option<Self> {
-        Some(Self { library: self.library.changed(change)?, ..self })
-    }
 }
 
 /// What makes rows of a regression of columns of gaps.
@@ -216,9 +209,6 @@ pub trait Rows: Send + Sync {
 
     /// Whitened rows of columns (touches × columns, µm).
     fn all(&self, columns_um: DMatrix<f64>) -> DMatrix<f64>;
-
-    /// Some of them, in ascending order. `um`: the columns at some touches.
-    fn some(&self, rows: &[usize], um: &dyn Fn(&[usize]) -> DMatrix<f64>) -> DMatrix<f64>;
 }
 
 /// All generic shapes of a table, as rows of a regression.
@@ -243,17 +233,18 @@ pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
         made.extend(own.iter().map(|f| (bare[place].clone(), f.clone())));
     }
     let n_columns = made.len();
-    let rows_count = rows.count();
+    let n_rows = rows.count();
     let names: Vec<String> = features.directions.iter().map(|d| d.name.clone()).collect();
     let features = features.clone();
+    // thousands of columns: to make them once more takes no longer than to fetch them from memory
     let make = move |numbers: &[usize], at: Option<&[usize]>| -> DMatrix<f64> {
-        let made = || numbers.iter().map(|&number| &made[number]);
+        let white = rows.all(gaps(&features, numbers.iter().map(|&number| &made[number])));
         match at {
-            None => rows.all(gaps(&features, made(), None)),
-            Some(at) => rows.some(at, &|touches| gaps(&features, made(), Some(touches))),
+            None => white,
+            Some(at) => white.select_rows(at),
         }
     };
-    let mut library = Library::made(rows_count, n_columns, Arc::new(make));
+    let mut library = Library::made(n_rows, n_columns, Arc::new(make));
     let mut shapes = Vec::new();
     for ((id, shape, values, n_scanned), spans) in planned.into_iter().zip(spans) {
         let variants = spans.into_iter().zip(values).map(|(columns, shape)| Variant { shape, columns }).collect();
@@ -267,38 +258,24 @@ pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
     Generics { library, shapes }
 }
 
-/// What some touches (`None`: all) see of one unit of each of some functions, µm.
-fn gaps<'a>(
-    features: &Features,
-    wanted: impl ExactSizeIterator<Item = &'a (Arc<Shape>, Function)>,
-    touches: Option<&[usize]>,
-) -> DMatrix<f64> {
-    let all: Vec<usize>;
-    let touches = match touches {
-        Some(some) => some,
-        None => {
-            all = (0..features.directions.first().map_or(0, |d| d.weight.len())).collect();
-            &all
-        }
-    };
-    let weights = |d: &Direction| -> Vec<f64> { touches.iter().map(|&touch| d.weight[touch]).collect() };
-    let weights: Vec<Vec<f64>> = features.directions.iter().map(weights).collect();
-    let mut out = DMatrix::zeros(touches.len(), wanted.len());
+/// What the touches see of one unit of each of some functions, µm.
+fn gaps<'a>(features: &Features, wanted: impl ExactSizeIterator<Item = &'a (Arc<Shape>, Function)>) -> DMatrix<f64> {
+    let n = features.directions.first().map_or(0, |d| d.weight.len());
+    let mut out = DMatrix::zeros(n, wanted.len());
     // values of a function where its variables act
     let mut known: Vec<(&Function, &[usize], Vec<f64>)> = Vec::new();
     for (mut column, (shape, function)) in out.column_iter_mut().zip(wanted) {
         let is_it = |(f, of, _): &(&Function, &[usize], Vec<f64>)| *f == function && *of == shape.variables;
         let at = known.iter().rposition(is_it).unwrap_or_else(|| {
-            let partly = || shape.variables.iter().map(|&v| &features.variables[v]).filter(|v| !v.acts.is_empty());
-            let acts = |touch: usize| partly().all(|v| v.acts_at(touch));
-            let at = |&touch: &usize| if acts(touch) { function.at_row(features, touch) } else { 0.0 };
-            known.push((function, &shape.variables, touches.iter().map(at).collect()));
+            let acts = |touch: usize| shape.variables.iter().all(|&v| features.variables[v].acts_at(touch));
+            let at = |touch: usize| if acts(touch) { function.at_row(features, touch) } else { 0.0 };
+            known.push((function, &shape.variables, (0..n).map(at).collect()));
             known.len() - 1
         });
         let (gap, values) = (column.as_mut_slice(), &known[at].2);
         match shape.direction {
             Some(d) => {
-                let each = gap.iter_mut().zip(values).zip(&weights[d]);
+                let each = gap.iter_mut().zip(values).zip(&features.directions[d].weight);
                 each.for_each(|((gap, value), weight)| *gap = weight * value);
             }
             None => gap.copy_from_slice(values),

@@ -385,33 +385,6 @@ fn the_best_variant_is_that_of_the_whole_test() {
 }
 
 #[test]
-fn a_library_in_parts_is_the_one_in_a_piece_and_each_may_be_changed_alone() {
-    let mut rng = rng(25);
-    let columns: Vec<DMatrix<f64>> = (1..4).map(|q| noise_matrix(&mut rng, 30, q)).collect();
-    let (mut in_parts, all) = (Library::new(30), side_by_side(&columns));
-    let spans = columns.iter().map(|c| in_parts.put(&Library::part(30, c.as_slice().to_vec()))).collect::<Vec<_>>();
-    assert_eq!((spans, in_parts.matrix()), (vec![0..1, 1..3, 3..6], all.clone()));
-    let doubled = in_parts.clone().changed(&|mut columns| columns *= 2.0).unwrap();
-    assert_eq!((doubled.matrix(), in_parts.matrix()), (&all * 2.0, all.clone()));
-    // some of the candidates: of a whole part, and of a piece of one, and another behind them
-    let place = |library: &mut Library, id: &str, spans: &[(usize, usize)]| {
-        let variants = spans.iter().map(|&(from, to)| Variant { shape: from as f64, columns: from..to });
-        library.place(id, Origin::Catalogue, variants.collect(), 0);
-    };
-    place(&mut in_parts, "one", &[(0, 1)]);
-    place(&mut in_parts, "second", &[(2, 3)]);
-    place(&mut in_parts, "last", &[(5, 6), (3, 5)]);
-    let mut some = in_parts.some(|c| c != 0);
-    some.push("more", Origin::Catalogue, &(all.columns(0, 1) * 3.0));
-    let expected = [(0, 0, all.columns(2, 1)), (1, 0, all.columns(5, 1)), (1, 1, all.columns(3, 2))];
-    for (candidate, variant, columns) in expected {
-        assert_eq!(some.columns(candidate, variant), columns, "{candidate} {variant}");
-    }
-    assert_eq!((some.columns(2, 0), some.n_columns()), (all.columns(0, 1) * 3.0, 5));
-    assert_eq!(in_parts.matrix(), all);
-}
-
-#[test]
 fn tests_go_on_with_a_larger_base_as_if_made_anew() {
     let mut rng = rng(26);
     let base = Basis::new(&noise_matrix(&mut rng, ROWS, 7));
