@@ -203,7 +203,7 @@ impl<'a> Touches<'a> {
                 visits.push(Visit { root: self.visit_root(&square), normals: normals_of(&normals) });
             }
         }
-        Whitening { scale: root.into_iter().map(|root| root / self.sigma_mm).collect(), visits }
+        Whitening { root, visits, sigma_mm: self.sigma_mm }
     }
 
     /// All touches in parts of about a thousand, visits whole where their touches share a displacement.

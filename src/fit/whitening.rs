@@ -5,11 +5,12 @@ use nalgebra::{DMatrix, DMatrixViewMut, Dyn, Matrix3, OMatrix, U3, Vector3};
 /// What turns columns of gaps (one row per touch, mm or mm per unit) into rows of unit noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Whitening {
-    /// Square root of each touch's weight divided by the standard deviation of a touch, 1/mm: zero where it is not used. Empty
-    /// where rows are of unit noise already.
-    pub(super) scale: Vec<f64>,
+    /// Square root of each touch's weight: zero where it is not used.
+    pub(super) root: Vec<f64>,
     /// Index visits whose touches share a displacement, one after the other.
     pub(super) visits: Vec<Visit>,
+    /// Standard deviation of a touch.
+    pub(super) sigma_mm: f64,
 }
 
 /// Outward normals in R, each times the root of its weight: one row for each touch.
@@ -70,19 +71,25 @@ impl Whitening {
             (place, from) = (end, to);
         }
         all.extend(&touches[place..]);
-        let scale = all.iter().filter_map(|&touch| self.scale.get(touch).copied()).collect();
-        (all, Self { scale, visits })
+        let root = all.iter().filter_map(|&touch| self.root.get(touch).copied()).collect();
+        (all, Self { root, visits, sigma_mm: self.sigma_mm })
     }
 
     /// The same for a part of a matrix.
     pub fn apply_to(&self, mut columns: DMatrixViewMut<'_, f64>) {
+        let weighted = self.root.iter().any(|root| *root != 1.0);
         for mut column in columns.column_iter_mut() {
-            column.as_mut_slice().iter_mut().zip(&self.scale).for_each(|(x, scale)| *x *= scale);
+            if weighted {
+                column.iter_mut().zip(&self.root).for_each(|(x, root)| *x *= root);
+            }
             let mut rest = column.as_mut_slice();
             for visit in &self.visits {
                 let (own, behind) = rest.split_at_mut(visit.normals.nrows());
                 visit.apply(own);
                 rest = behind;
+            }
+            if self.sigma_mm != 1.0 {
+                column.unscale_mut(self.sigma_mm);
             }
         }
     }
@@ -154,7 +161,7 @@ impl VisitNormals {
             }
             Visit { normals: visit.normals.clone(), root }
         };
-        Whitening { scale: Vec::new(), visits: self.visits.iter().map(of).collect() }
+        Whitening { root: Vec::new(), visits: self.visits.iter().map(of).collect(), sigma_mm: 1.0 }
     }
 
     /// Logarithm of the determinant of the touches' covariance, in units of a touch's variance.
