@@ -170,8 +170,8 @@ struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    /// Effect number i with its shapes where they start, one of them (by its place among the shapes) at other values; with
-    /// room for some more.
+    /// Columns of effect number i with its shapes where they start, one of them (by its place among the shapes) at each of some
+    /// values; behind them room for as many values as `room` says.
     fn whitened(&self, i: usize, which: Option<usize>, values: &[f64], room: usize) -> Arc<Vec<f64>> {
         let n_rows = self.evidence.n_rows();
         if !Library::keeps(n_rows) {

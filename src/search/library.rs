@@ -144,8 +144,8 @@ impl Library {
         span
     }
 
-    /// A library of columns that are made when they are needed: there are more of them than memory holds, or than it gives back
-    /// faster.
+    /// A library of columns that are made when they are needed: where memory does not hold them, or where it takes as long to
+    /// get memory for them as to make them again.
     #[must_use]
     pub fn made(n_rows: usize, count: usize, make: Make) -> Self {
         let columns = Columns::Made { make, numbers: (0..count).collect(), nothing: vec![OnceLock::new(); count] };

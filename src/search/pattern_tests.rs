@@ -236,7 +236,7 @@ pub fn generics(features: &Arc<Features>, rows: Arc<dyn Rows>) -> Generics {
     let n_rows = rows.count();
     let names: Vec<String> = features.directions.iter().map(|d| d.name.clone()).collect();
     let features = features.clone();
-    // thousands of columns: to make them once more takes no longer than to fetch them from memory
+    // not kept: to get memory for ten thousand columns takes longer than to make them again
     let make = move |numbers: &[usize], at: Option<&[usize]>| -> DMatrix<f64> {
         let white = rows.all(gaps(&features, numbers.iter().map(|&number| &made[number])));
         match at {
