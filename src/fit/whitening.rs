@@ -30,24 +30,32 @@ pub(super) struct Visit {
 }
 
 impl Visit {
-    /// Takes out what the touches of the visit share. A visit has few touches, and there are many columns: plain sums by place are
-    /// several times as fast here as products of matrices of any size.
-    fn apply(&self, part: &mut [f64]) {
-        let n = part.len();
+    /// Takes out of some columns what the touches of the visit share. A visit has few touches, and there are many columns: plain sums
+    /// by place are several times as fast here as products of matrices of any size.
+    fn apply<const K: usize>(&self, parts: [&mut [f64]; K]) {
+        let n = self.normals.nrows();
         let (x, others) = self.normals.as_slice().split_at(n);
         let (y, z) = others.split_at(n);
-        let mut shared = Vector3::zeros();
+        let parts = parts.map(|part| &mut part[..n]);
+        let mut shared = [Vector3::zeros(); K];
         for i in 0..n {
-            shared.x += x[i] * part[i];
-            shared.y += y[i] * part[i];
-            shared.z += z[i] * part[i];
+            for (shared, part) in shared.iter_mut().zip(&parts) {
+                shared.x += x[i] * part[i];
+                shared.y += y[i] * part[i];
+                shared.z += z[i] * part[i];
+            }
         }
-        let by = self.root * shared;
-        for i in 0..n {
-            part[i] -= x[i] * by.x + y[i] * by.y + z[i] * by.z;
+        for (shared, part) in shared.into_iter().zip(parts) {
+            let by = self.root * shared;
+            for i in 0..n {
+                part[i] -= x[i] * by.x + y[i] * by.y + z[i] * by.z;
+            }
         }
     }
 }
+
+/// Columns that are whitened side by side: no sum waits for itself.
+const AT_ONCE: usize = 4;
 
 impl Whitening {
     /// Whitens columns in place; rows of unused touches become zero.
@@ -77,20 +85,26 @@ impl Whitening {
 
     /// The same for a part of a matrix.
     pub fn apply_to(&self, mut columns: DMatrixViewMut<'_, f64>) {
-        let weighted = self.root.iter().any(|root| *root != 1.0);
-        for mut column in columns.column_iter_mut() {
-            if weighted {
+        let mut each: Vec<_> = columns.column_iter_mut().collect();
+        let (some, rest) = each.as_chunks_mut::<AT_ONCE>();
+        some.iter_mut().for_each(|some| self.apply_each(some.each_mut().map(|column| column.as_mut_slice())));
+        rest.iter_mut().for_each(|column| self.apply_each([column.as_mut_slice()]));
+    }
+
+    fn apply_each<const K: usize>(&self, mut columns: [&mut [f64]; K]) {
+        if self.root.iter().any(|root| *root != 1.0) {
+            for column in &mut columns {
                 column.iter_mut().zip(&self.root).for_each(|(x, root)| *x *= root);
             }
-            let mut rest = column.as_mut_slice();
-            for visit in &self.visits {
-                let (own, behind) = rest.split_at_mut(visit.normals.nrows());
-                visit.apply(own);
-                rest = behind;
-            }
-            if self.sigma_mm != 1.0 {
-                column.unscale_mut(self.sigma_mm);
-            }
+        }
+        let mut from = 0;
+        for visit in &self.visits {
+            let to = from + visit.normals.nrows();
+            visit.apply(columns.each_mut().map(|column| &mut column[from..to]));
+            from = to;
+        }
+        if self.sigma_mm != 1.0 {
+            columns.into_iter().flatten().for_each(|x| *x /= self.sigma_mm);
         }
     }
 }

@@ -106,7 +106,7 @@ impl Moments {
     pub fn with_more(&self, rows: &DMatrix<f64>, along: &DVector<f64>, library: &Library) -> Self {
         let chunks = library.chunks();
         let pieces: Vec<DMatrix<f64>> =
-            chunks.par_iter().map(|span| library.with(span.clone(), |j| rows * j)).collect();
+            chunks.par_iter().map(|span| library.with(span.clone(), |j| product(rows, j))).collect();
         let (p, q) = (self.qj.nrows(), rows.nrows());
         let mut qj = self.qj.clone().resize_vertically(p + q, 0.0);
         for (span, piece) in chunks.iter().zip(&pieces) {
@@ -140,6 +140,48 @@ impl Moments {
             _ => Block::new(raw, &(raw - w.tr_mul(&w))),
         }
     }
+}
+
+/// Rows up to which a product of nalgebra's writes each sum back to memory after each touch.
+const FEW_ROWS: usize = 5;
+
+/// Columns whose sums are made side by side: no sum waits for itself.
+const AT_ONCE: usize = 4;
+
+/// A few rows (q × N) times columns (N × m): q × m.
+fn product(rows: &DMatrix<f64>, j: DMatrixView<'_, f64>) -> DMatrix<f64> {
+    if rows.nrows() > FEW_ROWS {
+        return rows * j;
+    }
+    let directions = rows.transpose();
+    let columns: Vec<_> = j.column_iter().collect();
+    let mut out = DMatrix::zeros(rows.nrows(), columns.len());
+    for (row, direction) in directions.column_iter().enumerate() {
+        let direction = direction.as_slice();
+        let mut put = |at: usize, sums: &[f64]| {
+            sums.iter().enumerate().for_each(|(k, sum)| out[(row, at + k)] = *sum);
+        };
+        let (some, rest) = columns.as_chunks::<AT_ONCE>();
+        for (at, some) in some.iter().enumerate() {
+            put(AT_ONCE * at, &sums(direction, some.each_ref().map(|c| c.as_slice())));
+        }
+        for (at, column) in rest.iter().enumerate() {
+            put(AT_ONCE * some.len() + at, &sums(direction, [column.as_slice()]));
+        }
+    }
+    out
+}
+
+/// The products of a direction with some columns of the same length, each summed from the first touch to the last.
+fn sums<const K: usize>(direction: &[f64], columns: [&[f64]; K]) -> [f64; K] {
+    let columns = columns.map(|column| &column[..direction.len()]);
+    let mut sums = [0.0; K];
+    for (touch, along) in direction.iter().enumerate() {
+        for (sum, column) in sums.iter_mut().zip(&columns) {
+            *sum += along * column[touch];
+        }
+    }
+    sums
 }
 
 /// JᵀJ of a few columns.
@@ -203,5 +245,27 @@ impl Block {
     /// Rank q.
     pub fn rank(&self) -> usize {
         self.whitener.ncols()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::testing::{noise_matrix, rng};
+
+    #[test]
+    fn a_product_is_summed_from_the_first_touch_to_the_last() {
+        let mut rng = rng(4);
+        for (rows, columns) in [(1, 1), (1, 4), (2, 7), (5, 8), (FEW_ROWS + 1, 9), (3, 0)] {
+            let (rows, j) = (noise_matrix(&mut rng, rows, 23), noise_matrix(&mut rng, 23, columns));
+            let one_by_one = DMatrix::from_fn(rows.nrows(), columns, |row, column| {
+                (0..23).map(|touch| rows[(row, touch)] * j[(touch, column)]).sum::<f64>()
+            });
+            let found = product(&rows, j.as_view());
+            if rows.nrows() <= FEW_ROWS {
+                assert_eq!(found, one_by_one);
+            }
+            assert!((found - one_by_one).amax() < 1e-12);
+        }
     }
 }
