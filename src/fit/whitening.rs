@@ -54,7 +54,7 @@ impl Visit {
     }
 }
 
-/// Columns that are whitened side by side: no sum waits for itself.
+/// Columns that are whitened side by side: while one sum waits for its last addition, the others go on.
 const AT_ONCE: usize = 4;
 
 impl Whitening {
@@ -86,8 +86,8 @@ impl Whitening {
     /// The same for a part of a matrix.
     pub fn apply_to(&self, mut columns: DMatrixViewMut<'_, f64>) {
         let mut each: Vec<_> = columns.column_iter_mut().collect();
-        let (some, rest) = each.as_chunks_mut::<AT_ONCE>();
-        some.iter_mut().for_each(|some| self.apply_each(some.each_mut().map(|column| column.as_mut_slice())));
+        let (fours, rest) = each.as_chunks_mut::<AT_ONCE>();
+        fours.iter_mut().for_each(|four| self.apply_each(four.each_mut().map(|column| column.as_mut_slice())));
         rest.iter_mut().for_each(|column| self.apply_each([column.as_mut_slice()]));
     }
 
@@ -208,5 +208,24 @@ mod tests {
         // by hand: a touch alone along its normal, with half its standard deviation as scatter
         let lonely = whitened(&kept)[2] * (1.0f64 + 0.25).sqrt();
         assert!((lonely - 3.0).abs() < 1e-12, "{lonely}");
+    }
+
+    #[test]
+    fn columns_side_by_side_become_what_each_becomes_by_itself() {
+        let normals =
+            [[1.0, 0.0, 0.0], [0.6, 0.8, 0.0], [0.0, 0.6, 0.8], [0.0, 0.0, 1.0], [0.8, 0.0, 0.6]].map(Vector3::from);
+        let visits = VisitNormals::new(&[0, 0, 0, 1, 1], &normals, 0.001).change(0.0, 0.0007);
+        // a touch counts half, one is not used; behind them a prior
+        let whitening = Whitening { root: vec![1.0, 0.5, 1.0, 0.0, 1.0], sigma_mm: 0.003, ..visits };
+        let columns = DMatrix::from_fn(6, 2 * AT_ONCE + 3, |row, column| ((7 * row + 3 * column) % 11) as f64 - 4.5);
+        let mut all = columns.clone();
+        whitening.apply(&mut all);
+        for (k, column) in columns.column_iter().enumerate() {
+            let mut alone = DMatrix::from_column_slice(6, 1, column.as_slice());
+            whitening.apply(&mut alone);
+            assert_eq!(all.column(k), alone.column(0), "column {k}");
+            assert_eq!(alone[5], column[5] / 0.003);
+        }
+        assert_ne!(all, columns);
     }
 }
