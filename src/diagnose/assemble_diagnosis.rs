@@ -63,7 +63,6 @@ pub(super) fn put_together(
         }));
     }
     candidates.truncate(options.at_most.max(seen.first_names().len()));
-    super::turning_points::say(subject, &mut candidates);
     let found: Vec<&Group> = seen
         .groups
         .iter()

@@ -284,14 +284,19 @@ impl<'a> Tested<'a> {
         let Subject { machine, fit, .. } = subject;
         let Regression { evidence, named, generics, .. } = found;
         let mut seen = examine(fit, found, search, features, options.at_most);
-        let may_refit = options.refit && fit.outcome.rms_um <= setup_mistakes::GROSS_UM;
+        let gross = fit.outcome.rms_um > setup_mistakes::GROSS_UM;
+        let tried = |names: &[&str]| match tried_with(subject, names) {
+            // of so large an error a refit may be impossible: its names are none
+            Err(_) if gross => Ok(None),
+            again => again.map(Some),
+        };
         let (weighed, first_tried) = match seen.groups.first().filter(|_| seen.nested.is_some()) {
             Some(group) => rayon::join(
                 || effects_versus_patterns::weigh(&seen, generics, group.first()),
                 // where held-out touches bear the choice out it will most likely be asked for
                 || {
-                    let borne_out = may_refit && seen.nested.as_ref().is_some_and(decide::bears_out);
-                    borne_out.then(|| tried_with(subject, &seen.first_names()))
+                    let borne_out = options.refit && seen.nested.as_ref().is_some_and(decide::bears_out);
+                    borne_out.then(|| tried(&seen.first_names()))
                 },
             ),
             None => (effects_versus_patterns::Weighed::default(), None),
@@ -304,13 +309,14 @@ impl<'a> Tested<'a> {
             scatter: scatter(fit, machine, evidence),
         };
         let mut decision = decide::decide(&seen, &beside);
+        // names with which the error grows are none
+        let refused = |again: &Option<Fit>| again.as_ref().is_none_or(|again| raises_the_error(fit, again));
         let mut refitted = None;
         if let Some(pair) = pairs::both(subject, &seen, &decision) {
             let (groups, scores) = pairs::in_front(&seen, &pair, options.at_most);
             let names = groups[..2].iter().map(|group| &*named.effects[group.first()].id).collect::<Vec<_>>();
-            let again = if may_refit { Some(tried_with(subject, &names)?) } else { None };
-            // names with which the error grows are none
-            if !again.as_ref().is_some_and(|again| raises_the_error(fit, again)) {
+            let again = if options.refit { tried(&names)? } else { None };
+            if !options.refit || !refused(&again) {
                 (seen.groups, seen.beside) = (groups, Some(scores));
                 seen.groups.iter_mut().for_each(|group| without_needless_incidents(group, named));
                 (seen.both, seen.given) = (Some(pair), true);
@@ -319,13 +325,15 @@ impl<'a> Tested<'a> {
                 refitted = again;
             }
         }
-        if seen.both.is_none() && may_refit && decision.confirmed {
-            let again = first_tried.unwrap_or_else(|| tried_with(subject, &seen.first_names()))?;
-            if raises_the_error(fit, &again) {
+        if seen.both.is_none() && options.refit && decision.confirmed {
+            let again = first_tried.unwrap_or_else(|| tried(&seen.first_names()))?;
+            if refused(&again) {
                 (decision.kind, decision.confirmed) = (decide::Kind::Unexplained, false);
             }
-            refitted = Some(again);
+            refitted = again;
         }
+        // what a refit leaves of a gross error is not said: other mistakes come first
+        refitted = refitted.filter(|_| !gross);
         Ok(Self { subject, features, options, generics, seen, beside, decision, refitted })
     }
 
@@ -398,6 +406,7 @@ impl<'a> Tested<'a> {
             }
             assemble_diagnosis::outliers_again(&mut out, fit, &again);
         }
+        turning_points::say(subject, &mut out.candidates);
         decide::where_most_touches_are_unusable(&mut out, subject);
         not_identifiable::where_nothing_is_determined(&mut out, subject);
         out.oversized = oversized::oversized(fit, machine, catalogue);

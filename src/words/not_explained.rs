@@ -93,7 +93,10 @@ pub(super) fn remains(d: &Diagnosis) -> String {
             let part = looks_like("the residual", &candidate_names(d), c.share);
             format!(" {part}: something else is missing as well.")
         }
-        [first, _] if first.remains == Some(true) => " Something else is missing as well.".to_owned(),
+        [first, second] if first.remains == Some(true) => format!(
+            " A part of the residual looks like {} and {} together: something else is missing as well.",
+            first.effect, second.effect
+        ),
         _ => String::new(),
     }
 }

@@ -341,6 +341,11 @@ async function planNextFromThePage(t) {
   await page.waitForSelector("#job[data-state=done]", { timeout: 600_000 });
   const says = await page.textContent("#job");
   const [, touches] = /written into study-next beside the study, (\d+) touches/.exec(says) ?? [];
+  // what the touches decide, pair by pair
+  const [, sure, pairs] = /(\d+) of (\d+) pairs will be separated/.exec(says) ?? [];
+  const each = says.match(/^[a-z0-9-]+ or [a-z0-9-]+: (yes|likely|no|if the room turns)/gm) ?? [];
+  equal(each.length, Math.min(Number(pairs), 20), says);
+  equal(each.filter((line) => line.endsWith("yes")).length, Number(sure), says);
   const written = readdirSync(join(folder, "study-next"));
   const plan = JSON.parse(readFileSync(join(folder, "study-next", written.find((f) => f.endsWith(".plan.json"))), "utf8"));
   equal(plan.touches.length, Number(touches), says);

@@ -75,8 +75,9 @@ on("job", (job) => {
     const { answer, messages, folder, code } = job.answered;
     const says = code === 0 ? `${job.verb}: written into ${folder} beside the study` : `${job.verb} could not be done`;
     const more = job.verb === "plan-next" && answer?.touches ? `, ${answer.touches} touches, about ${Math.ceil(answer.time_s / 60)} min` : answer?.says ? `: ${answer.says}` : "";
+    const separates = answer?.separates ? `\n${answer.separates.join("\n")}` : "";
     const files = answer?.files ? `\n${answer.files.join(", ")}` : "";
-    at.textContent = job.verb === "export" ? `Written into ${folder}: see Export.` : `${says}${more}${files}${messages.length ? `\n${messages.join("\n")}` : ""}`;
+    at.textContent = job.verb === "export" ? `Written into ${folder}: see Export.` : `${says}${more}${separates}${files}${messages.length ? `\n${messages.join("\n")}` : ""}`;
   }
   byId("plan-next").disabled = at.dataset.state === "running";
 });

@@ -1,6 +1,6 @@
 //! Poses at which the user's own cycle measures the centre of a sphere: a table, and a CSV to be filled in.
 
-use super::write_program::say_separations;
+use super::write_program::{say_separations, separates};
 use super::{Answer, Args, Io};
 use crate::axes::AxisMap;
 use crate::design::questions::Questions;
@@ -51,6 +51,7 @@ pub(super) fn write_centres(args: &Args, name: &str, questions: &Questions, pose
         "format": "axiscal-next/1",
         "says": questions.says,
         "pairs": poses.separations,
+        "separates": separates(&poses.separations),
         "centres": centres,
         "file": file.display().to_string(),
     }));

@@ -99,6 +99,7 @@ pub(super) fn write(
         "format": "axiscal-next/1",
         "says": questions.says,
         "pairs": chosen.separations,
+        "separates": separates(&chosen.separations),
         "room": turns,
         "never": chosen.never,
         "touches": plan.touches.len(),
@@ -119,23 +120,37 @@ pub(super) fn say_separations(separations: &[Separation], io: &Io) {
             Cell::new(s.other.as_deref().unwrap_or("nothing")),
             number(significant(s.before)),
             number(significant(s.after)),
-            number(match s.told {
-                p if p >= SAFELY => format!("yes ({:.0} %)", (100.0 * p).floor()),
-                _ if s.told_if_room_turns.is_some_and(|p| p >= SAFELY) => "if the room turns".to_owned(),
-                p if p >= 0.5 => format!("likely ({:.0} %)", 100.0 * p),
-                p => format!("no ({:.0} %)", 100.0 * p),
-            }),
+            number(will_separate(s)),
         ]);
     }
     crate::report::lay::lay(&mut t, io.paper(false).width.min(120), &[]);
     io.say(io.paper(false).plain(t.to_string()));
-    let told = |limit: f64| separations.iter().filter(|s| s.told >= limit).count();
-    io.say(format!(
-        "{} of {} pairs will be separated by `diagnose` (with 95 % or more, whichever of the two acts); a separation of 25 or \
-         more is nearly always enough",
-        told(SAFELY),
+    io.say(format!("{}; a separation of 25 or more is nearly always enough", how_many(separations)));
+}
+
+/// Will a pair be separated?
+fn will_separate(s: &Separation) -> String {
+    match s.told {
+        p if p >= SAFELY => format!("yes ({:.0} %)", (100.0 * p).floor()),
+        _ if s.told_if_room_turns.is_some_and(|p| p >= SAFELY) => "if the room turns".to_owned(),
+        p if p >= 0.5 => format!("likely ({:.0} %)", 100.0 * p),
+        p => format!("no ({:.0} %)", 100.0 * p),
+    }
+}
+
+fn how_many(separations: &[Separation]) -> String {
+    let told = separations.iter().filter(|s| s.told >= SAFELY).count();
+    format!(
+        "{told} of {} pairs will be separated by `diagnose` (with 95 % or more, whichever of the two acts)",
         separations.len()
-    ));
+    )
+}
+
+/// The same for a page, a line each: how many pairs, and each of them.
+pub(super) fn separates(separations: &[Separation]) -> Vec<String> {
+    let pair =
+        |s: &Separation| format!("{} or {}: {}", s.one, s.other.as_deref().unwrap_or("nothing"), will_separate(s));
+    std::iter::once(how_many(separations)).chain(separations.iter().take(MOST_LISTED).map(pair)).collect()
 }
 
 /// The study's table of the run, as a person would write it.
