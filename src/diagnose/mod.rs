@@ -286,7 +286,7 @@ impl<'a> Tested<'a> {
         let mut seen = examine(fit, found, search, features, options.at_most);
         let gross = fit.outcome.rms_um > setup_mistakes::GROSS_UM;
         let tried = |names: &[&str]| match tried_with(subject, names) {
-            // of so large an error a refit may be impossible: its names are none
+            // with so large an error the refit may fail: its names are not proposed
             Err(_) if gross => Ok(None),
             again => again.map(Some),
         };
@@ -309,7 +309,7 @@ impl<'a> Tested<'a> {
             scatter: scatter(fit, machine, evidence),
         };
         let mut decision = decide::decide(&seen, &beside);
-        // names with which the error grows are none
+        // names are not proposed where their refit raises the error
         let refused = |again: &Option<Fit>| again.as_ref().is_none_or(|again| raises_the_error(fit, again));
         let mut refitted = None;
         if let Some(pair) = pairs::both(subject, &seen, &decision) {
@@ -332,7 +332,7 @@ impl<'a> Tested<'a> {
             }
             refitted = again;
         }
-        // what a refit leaves of a gross error is not said: other mistakes come first
+        // with a gross error the answer reports set-up mistakes first, and not what the refit leaves
         refitted = refitted.filter(|_| !gross);
         Ok(Self { subject, features, options, generics, seen, beside, decision, refitted })
     }

@@ -54,7 +54,7 @@ impl Visit {
     }
 }
 
-/// Columns that are whitened side by side: while one sum waits for its last addition, the others go on.
+/// Columns that are whitened side by side, so that the additions of different sums overlap.
 const AT_ONCE: usize = 4;
 
 impl Whitening {

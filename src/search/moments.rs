@@ -142,11 +142,11 @@ impl Moments {
     }
 }
 
-/// Rows up to which a product of nalgebra's writes each sum back to memory after each touch. Of more rows its blocks of columns are
-/// faster, and end in other last digits.
+/// Up to so many rows nalgebra's product writes each sum back to memory after each touch. With more rows it works on blocks of
+/// columns, which is faster and rounds differently.
 const FEW_ROWS: usize = 5;
 
-/// Columns whose sums are made side by side: while one sum waits for its last addition, the others go on.
+/// Columns that are summed side by side, so that the additions of different sums overlap.
 const AT_ONCE: usize = 4;
 
 /// A few rows (q × N) times columns (N × m): q × m.

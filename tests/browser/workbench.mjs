@@ -345,6 +345,7 @@ async function planNextFromThePage(t) {
   const [, sure, pairs] = /(\d+) of (\d+) pairs will be separated/.exec(says) ?? [];
   const each = says.match(/^[a-z0-9-]+ or [a-z0-9-]+: (yes|likely|no|if the room turns)/gm) ?? [];
   equal(each.length, Math.min(Number(pairs), 20), says);
+  holds(each.some((line) => line.startsWith("squareness-xy or ")), says);
   equal(each.filter((line) => line.endsWith("yes")).length, Number(sure), says);
   const written = readdirSync(join(folder, "study-next"));
   const plan = JSON.parse(readFileSync(join(folder, "study-next", written.find((f) => f.endsWith(".plan.json"))), "utf8"));

@@ -182,28 +182,21 @@ fn an_index_position_at_another_feed_tells_the_latency() {
     }
 }
 
-/// The axis has another zero in the second of two runs, 0.03 degrees: the blocks of each run stand for themselves.
+/// The axis has another zero in the second of two runs: the blocks of each run stand for themselves. At 0.3 degrees the error is gross,
+/// and the name is proposed because its refit does not raise the error.
 #[test]
 fn an_axis_that_was_homed_again_is_named() {
     let bench = Bench::of("trunnion", false);
-    let homed = |at: &At, wrong: &mut forward::Wrong| wrong.joint[3] += 0.03f64.to_radians() * at.run as f64;
-    let d = judge::diagnosis(&bench, &[&homed], 6);
-    assert!(d.verdict.is_missing_effect(), "{}", d.says);
-    assert_eq!(d.candidates[0].effect, "rehomed-a", "{}", d.says);
-    let size = d.candidates[0].parameters.iter().find(|p| p.name == "rehomed_A@run2").unwrap();
-    assert!((size.value - 0.03).abs() < 0.003, "{}", size.value);
-}
-
-/// Ten times as far, the error is so large that a set-up mistake is looked for first. The name stands: its refit brings the error down.
-#[test]
-fn an_axis_that_was_homed_far_off_is_named_too() {
-    let bench = Bench::of("trunnion", false);
-    let homed = |at: &At, wrong: &mut forward::Wrong| wrong.joint[3] += 0.3f64.to_radians() * at.run as f64;
-    let d = judge::diagnosis(&bench, &[&homed], 6);
-    assert!(d.verdict.is_missing_effect(), "{}", d.says);
-    let first = &d.candidates[0];
-    assert!(first.effect == "rehomed-a" || first.same_as.contains(&"rehomed-a".to_owned()), "{}", d.says);
-    assert!(d.rms_um > 50.0 && first.rms_after_um < 2.0, "{} {}", d.rms_um, first.rms_after_um);
+    for (off_deg, is_gross) in [(0.03f64, false), (0.3, true)] {
+        let homed = move |at: &At, wrong: &mut forward::Wrong| wrong.joint[3] += off_deg.to_radians() * at.run as f64;
+        let d = judge::diagnosis(&bench, &[&homed], 6);
+        assert_eq!(d.rms_um > 50.0, is_gross, "{}", d.rms_um);
+        assert!(d.verdict.is_missing_effect(), "{}", d.says);
+        assert_eq!(d.candidates[0].effect, "rehomed-a", "{}", d.says);
+        let size = d.candidates[0].parameters.iter().find(|p| p.name == "rehomed_A@run2").unwrap();
+        assert!((size.value - off_deg).abs() < 0.1 * off_deg, "{}", size.value);
+        assert!(d.candidates[0].rms_after_um < 2.0, "{}", d.candidates[0].rms_after_um);
+    }
 }
 
 /// From the middle of the measurement on an axis of the table and one of the head stand elsewhere than the control believes.

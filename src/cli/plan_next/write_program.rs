@@ -125,7 +125,7 @@ pub(super) fn say_separations(separations: &[Separation], io: &Io) {
     }
     crate::report::lay::lay(&mut t, io.paper(false).width.min(120), &[]);
     io.say(io.paper(false).plain(t.to_string()));
-    io.say(format!("{}; a separation of 25 or more is nearly always enough", how_many(separations)));
+    io.say(format!("{}; a separation of 25 or more is nearly always enough", separated_count(separations)));
 }
 
 /// Will a pair be separated?
@@ -138,7 +138,7 @@ fn will_separate(s: &Separation) -> String {
     }
 }
 
-fn how_many(separations: &[Separation]) -> String {
+fn separated_count(separations: &[Separation]) -> String {
     let told = separations.iter().filter(|s| s.told >= SAFELY).count();
     format!(
         "{told} of {} pairs will be separated by `diagnose` (with 95 % or more, whichever of the two acts)",
@@ -146,11 +146,11 @@ fn how_many(separations: &[Separation]) -> String {
     )
 }
 
-/// The same for a page, a line each: how many pairs, and each of them.
+/// The lines that a page shows: the count of pairs, then each pair.
 pub(super) fn separates(separations: &[Separation]) -> Vec<String> {
     let pair =
         |s: &Separation| format!("{} or {}: {}", s.one, s.other.as_deref().unwrap_or("nothing"), will_separate(s));
-    std::iter::once(how_many(separations)).chain(separations.iter().take(MOST_LISTED).map(pair)).collect()
+    std::iter::once(separated_count(separations)).chain(separations.iter().take(MOST_LISTED).map(pair)).collect()
 }
 
 /// The study's table of the run, as a person would write it.
